@@ -19,6 +19,10 @@ void check(const MeasuredData& data, const Settings& settings) {
   if (!(data.period_s > 0.0 && std::isfinite(data.period_s)))
     throw IdentificationError("the period of the data must be positive");
   if (settings.pole_pairs < 1) throw IdentificationError("pole_pairs must be 1 or more");
+  if (settings.sensors.gains && settings.kind == MotorKind::kDc)
+    throw IdentificationError(
+        "the gains of a DC motor's sensors cannot be found: it has one current and one voltage, and another "
+        "gain of either looks like another R, L, K_T and J; multiply a column by a gain that is known");
   for (const Column& column : data.columns) {
     if (column.values.size() != data.samples())
       throw IdentificationError(fmt::format("column {} has {} samples, the first one {}", column.name,

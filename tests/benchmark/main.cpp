@@ -29,7 +29,7 @@ constexpr std::array kMeasurements = std::to_array<Measurement>({
     {"shm", "lockstep exchanges through shared memory against a futex", measure_shared_memory},
     {"sdk", "a step behind the C ABI in process against the bench itself", measure_sdk},
     {"experiment", "data of an experiment against a copy of the same bytes", measure_experiment},
-    {"identification", "an induction motor, 600 random motors", measure_identification},
+    {"identification", "an induction motor, 800 random motors", measure_identification},
     {"suite", "a regression suite over presets and over a program", measure_suite},
     {"merge", "the reports of 100,000 results of a suite", measure_merge},
     {"realtime", "lateness of the pacers and of the server", measure_realtime},

@@ -33,7 +33,7 @@ std::vector<Row> measure_control();
 /// The data of an experiment on their way to a client against a copy of as many bytes.
 std::vector<Row> measure_experiment();
 
-/// The identification of an induction motor, and of 600 random motors with their experiments.
+/// The identification of an induction motor, and of 800 random motors with their experiments.
 std::vector<Row> measure_identification();
 
 /// `drivebench test`: its speed over presets, on one core and on two, what checks and a single case cost.

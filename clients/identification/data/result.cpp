@@ -206,8 +206,9 @@ std::string wiring_text(const WiringFact& fact) {
 }
 
 std::string sensor_text(const Estimate& e) {
-  return fmt::format("{} {:.4g} +- {:.2g}{}{}", e.name, e.value, e.interval.value_or(0.0),
-                     e.unit == "1" ? "" : " ", e.unit == "1" ? "" : e.unit);
+  if (!e.interval) return e.name + ": the data do not tell";
+  return fmt::format("{} {:.4g} +- {:.2g}{}{}", e.name, e.value, *e.interval, e.unit == "1" ? "" : " ",
+                     e.unit == "1" ? "" : e.unit);
 }
 
 std::string explanation_text(const Explanation& x) {
@@ -281,9 +282,10 @@ std::string to_json(const Result& r) {
         {"current_error", number(x.current_error)},     {"angle_error", number(x.angle_error)}};
   }
   for (const Estimate& error : r.sensors)
-    all["sensors"][error.name] = {{"estimate", number(error.value)},
-                                  {"unit", error.unit},
-                                  {"interval", number(error.interval.value_or(0.0))}};
+    all["sensors"][error.name] = {
+        {"estimate", error.interval ? number(error.value) : nlohmann::json(nullptr)},
+        {"unit", error.unit},
+        {"interval", error.interval ? number(*error.interval) : nlohmann::json(nullptr)}};
   for (const double flux_wb : r.curve_wb) {
     const Estimate& current = *r.find(curve_name(flux_wb));
     all["magnetising_curve"].push_back({{"flux_wb", flux_wb},

@@ -62,7 +62,8 @@ struct Result {
   std::size_t samples = 0;
   Excitation excitation{};
   std::optional<Explanation> explanation{};  ///< of the refinement
-  std::vector<Estimate> sensors{};           ///< errors that were looked for: "i_a_a offset", "u_b_v gain"
+  std::vector<Estimate> sensors{};           ///< errors that were looked for: "i_a_a offset", "u_b_v gain";
+                                             ///< without an interval: the data do not tell
   std::vector<WiringFact> wiring{};          ///< empty: not looked for
   std::vector<double> curve_wb{};  ///< fluxes of the points of the magnetising curve, rising: curve_name()
   std::vector<std::string> notes{};
@@ -102,7 +103,7 @@ struct EstimateText {
 };
 EstimateText text_of(const Result& result, const Estimate& estimate);
 
-/// The error of a sensor as text: "i_a_a offset 0.2 A +- 0.01 A".
+/// The error of a sensor as text: "i_a_a offset 0.2 A +- 0.01 A", or that the data do not tell it.
 std::string sensor_text(const Estimate& error);
 
 /// A fact as text: "pole pairs 6, found, as set".

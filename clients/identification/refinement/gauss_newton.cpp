@@ -11,71 +11,73 @@ namespace {
 using Matrix = Eigen::MatrixXd;
 using Vector = Eigen::VectorXd;
 
-constexpr double kDifference = 1e-5;
 constexpr double kUnknownDeviation = 100.0;
 constexpr int kMostGaussNewtonSteps = 15;
-constexpr double kSmallStep2 = 1e-4;  // of a step in its own standard deviations, squared
-constexpr double kNearStep2 = 100.0;  // the same: derivatives may stand
+constexpr double kNearStep2 = 100.0;  // of a step in its own standard deviations: derivatives may stand
 constexpr Eigen::Index kParts = 64;
 
 /// The residuals at a point and their derivatives.
 struct Linear {
-  Matrix residual;  ///< one column
+  Vector residual;
   Matrix jacobian;
   Matrix information;
 };
 
 bool linearise(const Residuals& residuals, const Vector& at, Linear& out) {
-  Matrix points = at.replicate(1, at.size());
-  points.diagonal().array() += kDifference;
-  if (!residuals(points, out.jacobian)) return false;
-  out.jacobian.colwise() -= out.residual.col(0);
-  out.jacobian *= 1.0 / kDifference;
+  if (!residuals.derivatives(at, out.jacobian)) return false;
   out.information = out.jacobian.transpose() * out.jacobian;
   out.information.diagonal().array() += 1.0 / (kUnknownDeviation * kUnknownDeviation);
   return out.information.allFinite();
 }
 
-/// The covariance about the scatter of the scores of parts of the record.
-Matrix scattered(const Linear& l, const Matrix& inverse) {
+/// How many times as large as `inverse`, the covariance of white residuals, that about the scatter of the
+/// scores of parts of the record makes the variance of each coordinate; 1 at least. White residuals scatter
+/// as well, by a variance of 2/n where n equal parts tell a coordinate: a growth of one such deviation is
+/// chance.
+Vector growth_of(const Linear& l, const Matrix& inverse) {
   const Eigen::Index rows = l.jacobian.rows();
   const Eigen::Index columns = l.jacobian.cols();
-  Matrix scatter = Matrix::Zero(columns, columns);
+  const Vector variance = inverse.diagonal();
+  Vector scatter = Vector::Zero(columns);
+  Vector chance2 = Vector::Zero(columns);
   for (Eigen::Index part = 0; part < kParts; ++part) {
     const Eigen::Index first = part * rows / kParts;
     const Eigen::Index count = (part + 1) * rows / kParts - first;
-    const Vector score =
-        l.jacobian.middleRows(first, count).transpose() * l.residual.col(0).segment(first, count);
-    scatter += score * score.transpose();
+    const auto jacobian = l.jacobian.middleRows(first, count);
+    const Vector move = inverse * (jacobian.transpose() * l.residual.segment(first, count));
+    scatter += move.cwiseAbs2();
+    const Matrix expected = jacobian * inverse;
+    chance2 +=
+        2.0 * (expected.colwise().squaredNorm().transpose().array() / variance.array()).square().matrix();
   }
   const double freedom = static_cast<double>(kParts) / static_cast<double>(kParts - columns);
-  return freedom * inverse * scatter * inverse;
+  return (freedom * scatter.array() / variance.array() - chance2.array().sqrt()).max(1.0);
 }
 
 Matrix covariance_of(const Linear& l) {
   const Matrix inverse =
       l.information.llt().solve(Matrix::Identity(l.information.rows(), l.information.cols()));
-  const Matrix robust = scattered(l, inverse);
-  const Vector growth = (robust.diagonal().array() / inverse.diagonal().array()).max(1.0).sqrt();
+  const Vector growth = growth_of(l, inverse).cwiseSqrt();
   return growth.asDiagonal() * inverse * growth.asDiagonal();
 }
 
 }  // namespace
 
-Fit gauss_newton(const Residuals& residuals, const Vector& start, double limit, double near_step) {
+Fit gauss_newton(const Residuals& residuals, const Vector& start, const Steps& steps) {
+  const double small2 = steps.small * steps.small;
   Fit fit;
   fit.at = start;
   fit.sum = std::numeric_limits<double>::infinity();
   Linear l;
-  if (!residuals(start, l.residual)) return fit;
+  if (!residuals.values(start, l.residual)) return fit;
   fit.sum = l.residual.squaredNorm();
   double damping = 0.0;
-  Matrix tried;
+  Vector tried;
   double size2 = 0.0;
   bool near = false;
   for (int step = 0; step < kMostGaussNewtonSteps; ++step) {
     if (!near && !linearise(residuals, fit.at, l)) return fit;
-    const Vector gradient = l.jacobian.transpose() * l.residual.col(0);
+    const Vector gradient = l.jacobian.transpose() * l.residual;
     bool better = false;
     for (int attempt = 0; attempt < 8 && !better; ++attempt) {
       Matrix damped = l.information;
@@ -83,26 +85,26 @@ Fit gauss_newton(const Residuals& residuals, const Vector& start, double limit, 
       Vector change = -damped.llt().solve(gradient);
       const double most = change.cwiseAbs().maxCoeff();
       if (!(most < std::numeric_limits<double>::infinity())) return fit;
-      if (most > limit) change *= limit / most;
+      if (most > steps.limit) change *= steps.limit / most;
       size2 = change.dot(l.information * change);
-      if (residuals(fit.at + change, tried)) {
+      if (residuals.values(fit.at + change, tried)) {
         const double sum = tried.squaredNorm();
         if (sum <= fit.sum) {
           fit.at += change;
           fit.sum = sum;
           l.residual.swap(tried);
           better = true;
-          near = size2 < kNearStep2 && change.cwiseAbs().maxCoeff() < near_step;
+          near = size2 < kNearStep2 && change.cwiseAbs().maxCoeff() < steps.near;
         }
       }
-      if (size2 < kSmallStep2) break;
+      if (size2 < small2) break;
       damping = better ? 0.1 * damping : std::max(10.0 * damping, 1e-3);
       if (damping < 1e-4) damping = 0.0;
     }
-    if (!better || size2 < kSmallStep2) break;
+    if (!better || size2 < small2) break;
   }
   fit.covariance = covariance_of(l);
-  fit.residual = l.residual.col(0);
+  fit.residual = l.residual;
   fit.jacobian = std::move(l.jacobian);
   fit.found = fit.covariance.allFinite();
   return fit;

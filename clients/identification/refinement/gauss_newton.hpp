@@ -5,9 +5,11 @@
 
 namespace drivebench::identification {
 
-/// Residuals as a function of coordinates, a column for each point; false where a point has none. Points come
-/// together so that their motors may run side by side.
-using Residuals = std::function<bool(const Eigen::MatrixXd& points, Eigen::MatrixXd& residuals)>;
+/// Residuals and their derivatives, a column for each coordinate; false where a point has none.
+struct Residuals {
+  std::function<bool(const Eigen::VectorXd& at, Eigen::VectorXd& residual)> values;
+  std::function<bool(const Eigen::VectorXd& at, Eigen::MatrixXd& jacobian)> derivatives;
+};
 
 /// A least squares of residuals of unit variance at its minimum.
 struct Fit {
@@ -16,18 +18,23 @@ struct Fit {
   Eigen::MatrixXd covariance;  ///< of the coordinates
   Eigen::VectorXd residual;    ///< at the minimum
   Eigen::MatrixXd jacobian;    ///< of the residuals, at most a hundredth of a standard deviation from there,
-                               ///< or what `near_step` allows
+                               ///< or what Steps::near allows
   bool found = false;
 };
 
-/// Gauss-Newton with damping after Levenberg and Marquardt, derivatives by forward differences. A direction
-/// that the residuals do not show stays where it is and has a standard deviation of 100. The covariance is
-/// component by component the larger one of two, by variance: the inverse of the information, and the same
-/// about the scatter of the scores of 64 parts of the record, which holds for residuals that are not white.
-/// `limit` bounds the change of a coordinate in a step. After a step of less than `near_step` in every
-/// coordinate and ten standard deviations the derivatives stand: many coordinates are worth it, and estimates
-/// move by some hundredths of a standard deviation.
-Fit gauss_newton(const Residuals& residuals, const Eigen::VectorXd& start, double limit,
-                 double near_step = 0.0);
+/// How a search moves.
+struct Steps {
+  double limit;         ///< of the change of a coordinate in a step
+  double near = 0.0;    ///< the derivatives stand after a step of less in every coordinate, and of less than
+                        ///< ten standard deviations
+  double small = 0.01;  ///< a step of so many standard deviations is the last
+};
+
+/// Gauss-Newton with damping after Levenberg and Marquardt. A direction that the residuals do not show stays
+/// where it is and has a standard deviation of 100. The covariance is that of
+/// white residuals, or where it is larger, coordinate by coordinate, that of the scatter of the scores of 64
+/// parts of the record less what chance makes of it, which holds for residuals that are not white.
+/// Derivatives that stand move estimates by some hundredths of a standard deviation.
+Fit gauss_newton(const Residuals& residuals, const Eigen::VectorXd& start, const Steps& steps);
 
 }  // namespace drivebench::identification

@@ -4,30 +4,14 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <complex>
 #include <cstddef>
 #include <limits>
-#include <numbers>
 #include <span>
 #include <vector>
 
-#include "clients/identification/math/direction.hpp"
-#include "clients/identification/math/runge_kutta.hpp"
-#include "clients/identification/motors/motor_models.hpp"
-#include "clients/identification/refinement/record.hpp"
+#include "clients/identification/refinement/flow.hpp"
 
 namespace drivebench::identification {
-
-/// What the sensors make of the truth: gain times it, plus offset, by phase.
-struct SensorErrors {
-  std::array<double, 3> current_gain = {1.0, 1.0, 1.0};
-  std::array<double, 3> current_offset_a{};
-  std::array<double, 3> voltage_gain = {1.0, 1.0, 1.0};
-  std::array<double, 3> voltage_offset_v{};
-  double angle_offset_rad = 0.0;  ///< electrical, added to that of the measured shaft
-
-  bool operator==(const SensorErrors&) const = default;
-};
 
 /// A motor that is predicted from sample to sample: the model runs on the measured voltages, its own shaft
 /// turns its frame, and after each sample a part of the difference between measured and predicted signals
@@ -36,48 +20,19 @@ struct SensorErrors {
 /// and the right noises the innovations are white, and their sum of squares is what maximum likelihood makes
 /// least: output error where the voltages are exact, and it does not drift where they are not.
 template <class Model>
-class Predictor {
+class Predictor : public Flow<Model> {
  public:
-  static constexpr int kStates = static_cast<int>(std::tuple_size_v<typename Model::State>) + 1;
-  static constexpr int kMostOutputs = 4;  ///< currents of the phases, then the angle
-  using State = std::array<double, std::tuple_size_v<typename Model::State> + 1>;
-  using Square = Eigen::Matrix<double, kStates, kStates>;
-  using Inputs = Eigen::Matrix<double, kStates, 3>;
-  using Outputs = Eigen::Matrix<double, kMostOutputs, kStates>;
-  using Values = std::array<double, std::size_t{kMostOutputs}>;  ///< one for each output
+  using Base = Flow<Model>;
+  using Base::kStates, Base::kMostOutputs, Base::outputs;
+  using typename Base::Outputs, typename Base::Square, typename Base::State, typename Base::Values,
+      typename Base::Vector;
 
-  Predictor(const PredictorRecord& record, const Model& model) : r_(record) {
-    const double steps = std::ceil(r_.period_s * model.fastest_rate(r_.largest_speed) / kStepOfRate);
-    if (!(steps <= kMostSteps))
-      throw IdentificationError("the motor found is too fast for the period of the data");
-    substeps_ = std::max(1, static_cast<int>(steps));
-    outputs_ = static_cast<int>(r_.currents.size()) + 1;
-    samples_.resize(r_.range.count());
+  Predictor(const PredictorRecord& record, const Model& model) : Base(record, model) {
+    samples_.resize(Base::samples());
     corrections_.resize(samples_.size());
-    correct({});
   }
 
-  int outputs() const noexcept { return outputs_; }
-  std::size_t rows() const noexcept { return samples_.size() * static_cast<std::size_t>(outputs_); }
-
-  /// The errors that the measured signals are freed of from now on.
-  void correct(const SensorErrors& errors) {
-    if (!measured_.empty() && errors == errors_) return;
-    errors_ = errors;
-    measured_.clear();
-    voltages_.clear();
-    for (std::size_t k = r_.range.first; k < r_.range.end; ++k) {
-      for (std::size_t phase = 0; phase < r_.currents.size(); ++phase)
-        measured_.push_back(current(phase, k));
-      measured_.push_back(r_.angle[k]);
-      for (int place = 0; place <= 2 * substeps_; ++place) {
-        std::array<double, 3> u = r_.voltages.at(k, place / (2.0 * substeps_));
-        for (std::size_t phase = 0; phase < u.size(); ++phase)
-          u[phase] = (u[phase] - errors.voltage_offset_v[phase]) / errors.voltage_gain[phase];
-        voltages_.push_back(u);
-      }
-    }
-  }
+  std::size_t rows() const noexcept { return samples_.size() * at(outputs_); }
 
   /// Linearises the model along its filtered run with these noises.
   void linearise(const Model& model, const SensorNoise& noise) { run<true>(model, noise); }
@@ -90,32 +45,70 @@ class Predictor {
     return run<false>(model, noise, kSamples);
   }
 
-  /// The innovations of each model with the gains of the last filter(), over their expected rms, sample by
-  /// sample, a column for each model; false if a run leaves all bounds. The models run side by side, so that
-  /// none waits for the end of its own step. They may be of another type with the same state.
-  template <class Other>
-  bool innovations(std::span<const Other> models, Eigen::Ref<Eigen::MatrixXd> out) const {
-    std::vector<State> states;
-    for (const Other& model : models)
-      states.push_back(first_state(model));
+  /// The innovations of a motor with the gains of the last filter(), over their expected rms, sample by
+  /// sample; false if the run leaves all bounds. It may be of another type with the same state.
+  bool innovations(const auto& model, Eigen::VectorXd& out) const {
+    State x = first_state(model, errors_);
+    out.resize(static_cast<Eigen::Index>(rows()));
     for (std::size_t n = 0; n < samples_.size(); ++n) {
-      for (std::size_t m = 0; m < models.size(); ++m) {
-        const auto row = static_cast<Eigen::Index>(n) * outputs_;
-        states[m] = followed(models[m], states[m], n, &out(row, static_cast<Eigen::Index>(m)));
-      }
-      if (!std::ranges::all_of(states, bounded)) return false;
+      const Direction direction = direction_at(x);
+      const Values found = corrected_by_gains(n, errors_at(n, outputs(model, x, direction)), x);
+      for (std::size_t j = 0; j < at(outputs_); ++j)
+        out(static_cast<Eigen::Index>(n * at(outputs_) + j)) = found[j] * corrections_[n].weight[j];
+      x = advanced(model, x, n, direction);
+      if (!bounded(x)) return false;
     }
     return true;
+  }
+
+  /// The derivatives of innovations() by the coordinates that moved the motors by `difference`, a column for
+  /// each, from the variational equations along the run of `model`; false if that leaves all bounds.
+  bool derivatives(const Model& model, std::span<const Moved<Model>> moved, double difference,
+                   Eigen::MatrixXd& out) const {
+    State x = first_state(model, errors_);
+    const std::size_t count = moved.size();
+    Columns shift(kStates, index(count));
+    for (std::size_t k = 0; k < count; ++k)
+      shift.col(index(k)) =
+          (vector_of(first_state(moved[k].model, moved[k].errors)) - vector_of(x)) / difference;
+    out.resize(static_cast<Eigen::Index>(rows()), shift.cols());
+    Eigen::Matrix<double, kMostOutputs, Eigen::Dynamic> errors(kMostOutputs, shift.cols());
+    Columns slopes(kStates, shift.cols());
+    Columns carried(kStates, shift.cols());
+    for (std::size_t n = 0; n < samples_.size(); ++n) {
+      const Direction direction = direction_at(x);
+      const Values values = outputs(model, x, direction);
+      errors.noalias() = -shown_at(model, x, values, direction).lazyProduct(shift);
+      for (std::size_t k = 0; k < count; ++k) {
+        if (moved[k].sensors) errors.col(index(k)) += sensed(moved[k], n, x, values) / difference;
+      }
+      correct_shifts(n, errors, shift, out);
+      corrected_by_gains(n, errors_at(n, values), x);
+      x = followed(model, x, n, direction, [&](const Tangent& tangent) {
+        for (std::size_t k = 0; k < count; ++k)
+          slopes.col(index(k)) = moved_slope(tangent, moved[k]) / difference;
+        carried.noalias() = tangent.transition.lazyProduct(shift);
+        carried.noalias() += tangent.growth.lazyProduct(slopes);
+        shift.swap(carried);
+      });
+      if (!bounded(x)) return false;
+    }
+    return out.allFinite();
   }
 
   /// The state of the last filter() or linearise() at each sample, with the angle at its end.
   const std::vector<State>& filtered() const noexcept { return filtered_; }
 
  private:
-  static constexpr double kStepOfRate = 0.2;
-  static constexpr double kMostSteps = 100.0;
+  using Inputs = Eigen::Matrix<double, kStates, 3>;
+  using Columns = Eigen::Matrix<double, kStates, Eigen::Dynamic>;  ///< of a state by each coordinate
+  using Base::advanced, Base::at, Base::direction_at, Base::errors_at, Base::first_state, Base::followed;
+  using Base::errors_, Base::moved_slope, Base::outputs_, Base::r_, Base::sensed, Base::shown_at, Base::slope,
+      Base::vector_of;
+  using typename Base::Tangent;
+
   static constexpr double kBeyondAllBounds = 1e9;
-  static constexpr double kDifference = 1e-3;  // of the derivatives by the state, in its largest values
+  static constexpr double kVolt = 1.0;  // of the derivatives by the voltages
 
   struct Sample {
     Square transition;  ///< of the state from this sample to the next
@@ -129,108 +122,30 @@ class Predictor {
     Values weight;
   };
 
-  static constexpr std::size_t at(int index) noexcept { return static_cast<std::size_t>(index); }
+  static Eigen::Index index(std::size_t k) noexcept { return static_cast<Eigen::Index>(k); }
 
-  double electrical(double shaft_rad) const noexcept {
-    return r_.pole_pairs * shaft_rad + errors_.angle_offset_rad;
-  }
-
-  double current(std::size_t phase, std::size_t sample) const noexcept {
-    return (r_.currents[phase][sample] - errors_.current_offset_a[phase]) / errors_.current_gain[phase];
-  }
-
-  static typename Model::State part_of(const State& x) noexcept {
-    typename Model::State part;
-    std::copy_n(x.begin(), part.size(), part.begin());
-    return part;
-  }
-
-  /// Of the rotor in this state, for a model that turns.
-  Direction direction_at(const State& x) const noexcept {
-    if constexpr (Model::kTurns) return Direction(electrical(x.back()));
-    return {};
-  }
-  static std::complex<double> turned(const Direction& near, double electrical_rad) noexcept {
-    if constexpr (Model::kTurns) return near.of(electrical_rad);
-    return 1.0;
-  }
-
-  Values outputs(const auto& model, const State& x, const Direction& near) const noexcept {
-    const double electrical_rad = electrical(x.back());
-    const auto i = model.currents(
-        part_of(x), {.u = {}, .electrical_rad = electrical_rad, .direction = turned(near, electrical_rad)});
-    Values values{};
-    std::copy(i.begin(), i.end(), values.begin());
-    values[at(outputs_ - 1)] = x.back();
-    return values;
-  }
-
-  /// The measured outputs of the n-th sample less these.
-  Values errors_at(std::size_t n, const Values& values) const noexcept {
-    Values e{};
-    for (std::size_t j = 0; j < at(outputs_); ++j)
-      e[j] = measured_[n * at(outputs_) + j] - values[j];
-    return e;
-  }
-
-  /// The state after the n-th sample, from x at it on, with voltages added to the measured ones.
-  State advanced(const auto& model, State x, std::size_t n, const std::array<double, 3>& added_v,
-                 Direction near) const {
-    const std::array<double, 3>* u = &voltages_[n * at(2 * substeps_ + 1)];
-    const double step_s = r_.period_s / substeps_;
-    for (int step = 0; step < substeps_; ++step, u += 2) {
-      const State before = x;
-      if constexpr (Model::kTurns) {
-        if (step > 0) near = near.moved(electrical(x.back()));
-      }
-      x = runge_kutta(before, step_s, [&](const State& y, double part) {
-        const double electrical_rad = electrical(y.back());
-        MotorInput in{.u = u[static_cast<int>(2.0 * part)],
-                      .electrical_rad = electrical_rad,
-                      .direction = turned(near, electrical_rad)};
-        for (std::size_t k = 0; k < in.u.size(); ++k)
-          in.u[k] += added_v[k];
-        const typename Model::State slope = model.slope(part_of(y), in);
-        State all;
-        std::copy(slope.begin(), slope.end(), all.begin());
-        all.back() = y[Model::kSpeed];
-        return all;
-      });
-      typename Model::State settled = part_of(x);
-      model.settle(settled, part_of(before), step_s);
-      std::copy(settled.begin(), settled.end(), x.begin());
-    }
-    return x;
-  }
-
-  /// The state at the next sample; the innovations of the n-th one go to `out`.
-  State followed(const auto& model, State x, std::size_t n, double* out) const {
-    const Direction direction = direction_at(x);
+  /// The innovations of the n-th sample, each after those before it have moved the state, from the errors of
+  /// the outputs; they move x.
+  Values corrected_by_gains(std::size_t n, Values found, State& x) const noexcept {
     const Correction& c = corrections_[n];
-    Values found = errors_at(n, outputs(model, x, direction));
-    for (int j = 0; j < outputs_; ++j) {  // each after those before it have moved the state
+    for (int j = 0; j < outputs_; ++j) {
       for (int i = 0; i < j; ++i)
         found[at(j)] -= c.coupling(j, i) * found[at(i)];
-      out[j] = found[at(j)] * c.weight[at(j)];
       for (int i = 0; i < kStates; ++i)
         x[at(i)] += c.gain(i, j) * found[at(j)];
     }
-    return advanced(model, x, n, {}, direction);
+    return found;
   }
 
-  State first_state(const auto& model) const {
-    const std::size_t k = r_.range.first;
-    State x{};
-    x.back() = r_.angle[k];
-    std::array<double, 3> currents{};
-    for (std::size_t phase = 0; phase < r_.currents.size(); ++phase)
-      currents[phase] = current(phase, k);
-    const double electrical_rad = electrical(r_.angle[k]);
-    const auto part = model.state_of(
-        currents, r_.first_speed,
-        {.u = {}, .electrical_rad = electrical_rad, .direction = std::polar(1.0, electrical_rad)});
-    std::copy(part.begin(), part.end(), x.begin());
-    return x;
+  /// The same of small changes; their rows of the derivatives go to `out`.
+  void correct_shifts(std::size_t n, auto& errors, Columns& shift, Eigen::MatrixXd& out) const {
+    const Correction& c = corrections_[n];
+    for (int j = 0; j < outputs_; ++j) {
+      for (int i = 0; i < j; ++i)
+        errors.row(j) -= c.coupling(j, i) * errors.row(i);
+      shift.noalias() += c.gain.col(j).lazyProduct(errors.row(j));
+      out.row(index(n) * outputs_ + j) = c.weight[at(j)] * errors.row(j);
+    }
   }
 
   Square first_spread(const Model& model, const SensorNoise& noise) const {
@@ -247,31 +162,22 @@ class Predictor {
     return std::ranges::all_of(x, [](double value) { return std::abs(value) < kBeyondAllBounds; });
   }
 
-  void differentiate(const Model& model, const State& x, std::size_t n, const Direction& near,
-                     Sample& s) const {
-    const State next = advanced(model, x, n, {}, near);
-    const Values values = outputs(model, x, near);
-    const auto spread = model.spread(kDifference * r_.largest_current_a, kDifference * r_.largest_speed);
-    for (int i = 0; i < kStates; ++i) {
-      const double difference = i + 1 == kStates ? kDifference / r_.pole_pairs : spread[at(i)];
-      State moved = x;
-      moved[at(i)] += difference;
-      const State there = advanced(model, moved, n, {}, near);
-      const Values moved_values = outputs(model, moved, near);
-      for (int row = 0; row < kStates; ++row)
-        s.transition(row, i) = (there[at(row)] - next[at(row)]) / difference;
-      for (int j = 0; j < outputs_; ++j)
-        s.shown(j, i) = (moved_values[at(j)] - values[at(j)]) / difference;
-    }
+  /// The state after the n-th sample, with its derivatives.
+  State differentiated(const Model& model, const State& x, std::size_t n, const Direction& near,
+                       Sample& s) const {
+    s.transition.setIdentity();
     s.drive.setZero();
-    constexpr double kVolt = 1.0;
-    for (std::size_t phase = 0; phase < r_.currents.size(); ++phase) {
-      std::array<double, 3> added{};
-      added[phase] = kVolt;
-      const State there = advanced(model, x, n, added, near);
-      for (int row = 0; row < kStates; ++row)
-        s.drive(row, static_cast<int>(phase)) = (there[at(row)] - next[at(row)]) / kVolt;
-    }
+    return followed(model, x, n, near, [&](const Tangent& tangent) {
+      Inputs by_voltage = Inputs::Zero();
+      for (std::size_t phase = 0; phase < r_.currents.size(); ++phase) {
+        std::array<double, 3> u = tangent.u;
+        u[phase] += kVolt;
+        by_voltage.col(static_cast<Eigen::Index>(phase)) =
+            (vector_of(slope(model, tangent.middle, u, tangent.near, errors_)) - tangent.slope) / kVolt;
+      }
+      s.drive = (tangent.transition * s.drive + tangent.growth * by_voltage).eval();
+      s.transition = (tangent.transition * s.transition).eval();
+    });
   }
 
   /// Gains, coupling and weights of a sample, one output after the other; p becomes the spread after them.
@@ -299,10 +205,17 @@ class Predictor {
     return sum;
   }
 
+  /// While the encoder shows its first count the error of that is one error: all these samples tell as much of
+  /// the angle as one does, and of the speed that the shaft has not moved by a count.
+  SensorNoise noise_at(std::size_t n, SensorNoise noise) const noexcept {
+    if (n < r_.still) noise.angle_rad *= std::sqrt(static_cast<double>(r_.still));
+    return noise;
+  }
+
   template <bool linearising>
   double run(const Model& model, const SensorNoise& noise,
              std::size_t most = std::numeric_limits<std::size_t>::max()) {
-    State x = first_state(model);
+    State x = first_state(model, errors_);
     Square p = first_spread(model, noise);
     const double voltage2 = noise.voltage_v * noise.voltage_v;
     double sum = 0.0;
@@ -310,11 +223,15 @@ class Predictor {
     for (std::size_t n = 0; n < std::min(most, samples_.size()); ++n) {
       const Direction direction = direction_at(x);
       Sample& s = samples_[n];
-      if constexpr (linearising) differentiate(model, x, n, direction, s);
-      const Values errors = errors_at(n, outputs(model, x, direction));
-      sum += corrected(s, noise, errors, x, p, corrections_[n]);
+      const Values values = outputs(model, x, direction);
+      if constexpr (linearising) s.shown = shown_at(model, x, values, direction);
+      const Values errors = errors_at(n, values);
+      sum += corrected(s, noise_at(n, noise), errors, x, p, corrections_[n]);
       filtered_.push_back(x);
-      x = advanced(model, x, n, {}, direction);
+      if constexpr (linearising)
+        x = differentiated(model, x, n, direction, s);
+      else
+        x = advanced(model, x, n, direction);
       if (!bounded(x)) return std::numeric_limits<double>::infinity();
       const Square carried = s.transition * p;
       p.noalias() = carried * s.transition.transpose();
@@ -324,14 +241,8 @@ class Predictor {
     return std::isfinite(sum) ? sum : std::numeric_limits<double>::infinity();
   }
 
-  const PredictorRecord& r_;
-  SensorErrors errors_;
-  int substeps_ = 1;
-  int outputs_ = 0;
   std::vector<Sample> samples_;
   std::vector<Correction> corrections_;
-  std::vector<double> measured_;                 ///< outputs of all samples, freed of the errors
-  std::vector<std::array<double, 3>> voltages_;  ///< the same, at both ends and in the middle of each step
   std::vector<State> filtered_;
 };
 

@@ -7,6 +7,16 @@
 #include "clients/identification/data/noise.hpp"
 
 namespace drivebench::identification {
+namespace {
+
+std::size_t still_samples(const PredictorRecord& r, const Settings& e) {
+  if (e.counts_per_revolution <= 0.0) return 0;
+  const auto first = r.angle.begin() + static_cast<std::ptrdiff_t>(r.range.first);
+  const auto end = r.angle.begin() + static_cast<std::ptrdiff_t>(r.range.end);
+  return static_cast<std::size_t>(std::find_if(first, end, [&](double a) { return a != *first; }) - first);
+}
+
+}  // namespace
 
 PredictorRecord record_of(const MeasuredData& data, const Settings& e) {
   PredictorRecord r{.voltages = {data, e},
@@ -27,6 +37,7 @@ PredictorRecord record_of(const MeasuredData& data, const Settings& e) {
   r.angle = measured_angle(data, e);
   r.largest_speed = largest(shaft.speed);
   r.first_speed = shaft.speed[r.range.first];
+  r.still = still_samples(r, e);
   return r;
 }
 
@@ -36,6 +47,7 @@ PredictorRecord from_rest(PredictorRecord record, const MeasuredData& data, cons
   record.range.first = 0;
   record.first_speed = shaft.speed[0];
   record.from_rest = true;
+  record.still = still_samples(record, e);
   return record;
 }
 

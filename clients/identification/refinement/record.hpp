@@ -24,6 +24,7 @@ struct PredictorRecord {
   double first_speed;        ///< [rad/s]
   double largest_current_a;  ///< in the record
   double largest_speed;      ///< [rad/s]
+  std::size_t still = 0;     ///< first samples of the range in which the encoder shows one count
   bool from_rest = false;    ///< the first sample of the range has no flux, current or speed
 };
 

@@ -8,7 +8,6 @@
 #include <iterator>
 #include <numbers>
 #include <optional>
-#include <span>
 #include <string>
 #include <type_traits>
 #include <utility>
@@ -117,8 +116,11 @@ Straight straight_of(const Predictor<InductionModel>& predictor, const Fit& fit,
   Straight straight{.largest_wb = *std::max_element(settled, flux_wb.end())};
   const auto motors = bending_motors(flux_wb, motor, kBend);
   Eigen::MatrixXd directions(fit.residual.size(), static_cast<Eigen::Index>(motors.size()));
-  if (!predictor.innovations(std::span<const BendingInductionModel>(motors), directions)) return straight;
-  directions.colwise() -= fit.residual;
+  Eigen::VectorXd bent;
+  for (std::size_t k = 0; k < motors.size(); ++k) {
+    if (!predictor.innovations(motors[k], bent)) return straight;
+    directions.col(static_cast<Eigen::Index>(k)) = bent - fit.residual;
+  }
   straight.bend = test_bend(fit, unknowns, directions / kBend);
   return straight;
 }
@@ -169,12 +171,11 @@ Straight refine_with(const PredictorRecord& record, const Settings& e, Result& r
   const Fit fit = fit_in_rounds(record, e, predictor, unknowns, trial, noise, near != nullptr);
   Straight straight;
   if (!fit.found) {
-    set_apart(e, result);
+    set_apart(e, unknowns, false, result);
     result.excitation = verdict_against(result, "no motor near that of the equations follows it");
     return straight;
   }
   put_fit(e, unknowns, fit, result);
-  set_apart(e, result);
   result.explanation = explanation_of(predictor, fit, noise, record, e);
   Series speeds;
   for (const auto& x : predictor.filtered())
@@ -184,6 +185,7 @@ Straight refine_with(const PredictorRecord& record, const Settings& e, Result& r
   result.explanation->unlikelihood = predictor.unlikelihood(Model(trial, e), noise);
   const std::string reason = reason_against(result, record);
   result.explanation->holds = reason.empty();
+  set_apart(e, unknowns, reason.empty(), result);
   if (!reason.empty()) {
     result.excitation = verdict_against(result, reason);
     return straight;

@@ -2,7 +2,6 @@
 
 #include <Eigen/Dense>
 #include <algorithm>
-#include <span>
 #include <vector>
 
 #include "clients/identification/refinement/gauss_newton.hpp"
@@ -17,7 +16,9 @@ inline constexpr int kRounds = 2;           ///< of linearisation, Gauss-Newton 
 inline constexpr int kSaturatedRounds = 4;  ///< of a motor with a magnetising curve, until the noises stand
 inline constexpr double kHopeless =
     25.0;  ///< mean square of the first round's innovations, where 1 is expected
-inline constexpr double kNearStep = 0.03;      ///< in which the derivatives of a motor with a curve stand
+inline constexpr double kNearStep = 0.03;      ///< in which derivatives stand
+inline constexpr double kRoughly = 0.1;        ///< of a standard deviation: what a round leaves to the next
+inline constexpr double kFinely = 0.01;        ///< what the last one leaves
 inline constexpr double kLargestChange = 0.7;  ///< of a logarithm in a step
 
 /// The noises of voltages and currents that make the likelihood greatest, each to a fifth.
@@ -64,36 +65,45 @@ class MotorResiduals {
     if (split != unknowns.end()) split_ = split - unknowns.begin();
   }
 
-  bool operator()(const Eigen::MatrixXd& points, Eigen::MatrixXd& out) const {
-    const auto rows = static_cast<Eigen::Index>(predictor_.rows());
-    out.resize(rows + (split_ < 0 ? 0 : 1), points.cols());
-    if (split_ >= 0) out.row(rows) = split_weight * points.row(split_);
-    std::vector<Model> models;  // those of the same sensors run side by side
-    SensorErrors errors;
-    Eigen::Index first_column = 0;
-    const auto run = [&] {
-      const auto count = static_cast<Eigen::Index>(models.size());
-      predictor_.correct(errors);
-      const bool whole =
-          predictor_.innovations(std::span<const Model>(models), out.block(0, first_column, rows, count));
-      models.clear();
-      first_column += count;
-      return whole;
-    };
-    for (Eigen::Index k = 0; k < points.cols(); ++k) {
-      put(unknowns_, points.col(k), trial_);
+  bool values(const Eigen::VectorXd& at, Eigen::VectorXd& out) const {
+    put(unknowns_, at, trial_);
+    if (!is_motor(trial_)) return false;
+    predictor_.correct(errors_of(trial_));
+    if (!predictor_.innovations(Model(trial_, settings_), out)) return false;
+    if (split_ < 0) return true;
+    out.conservativeResize(out.size() + 1);
+    out(out.size() - 1) = split_weight * at(split_);
+    return true;
+  }
+
+  bool derivatives(const Eigen::VectorXd& at, Eigen::MatrixXd& out) const {
+    put(unknowns_, at, trial_);
+    if (!is_motor(trial_)) return false;
+    const Model model(trial_, settings_);
+    const SensorErrors errors = errors_of(trial_);
+    predictor_.correct(errors);
+    std::vector<Moved<Model>> moved;
+    for (Eigen::Index k = 0; k < at.size(); ++k) {
+      Eigen::VectorXd there = at;
+      there(k) += kDifference;
+      put(unknowns_, there, trial_);
       if (!is_motor(trial_)) return false;
-      const SensorErrors here = errors_of(trial_);
-      if (!models.empty() && !(here == errors) && !run()) return false;
-      errors = here;
-      models.emplace_back(trial_, settings_);
+      const SensorErrors seen = errors_of(trial_);
+      moved.push_back({.model = Model(trial_, settings_), .errors = seen, .sensors = !(seen == errors)});
     }
-    return run();
+    if (!predictor_.derivatives(model, moved, kDifference, out)) return false;
+    if (split_ < 0) return true;
+    out.conservativeResize(out.rows() + 1, Eigen::NoChange);
+    out.row(out.rows() - 1).setZero();
+    out(out.rows() - 1, split_) = split_weight;
+    return true;
   }
 
   double split_weight = 1.0;
 
  private:
+  static constexpr double kDifference = 1e-5;
+
   Predictor<Model>& predictor_;
   const std::vector<Unknown>& unknowns_;
   Result& trial_;
@@ -120,7 +130,11 @@ Fit fit_in_rounds(const PredictorRecord& record, const Settings& e, Predictor<Mo
                           .angle_rad = first.angle_rad};
   const SensorNoise most{
       .voltage_v = voltage_rms_v, .current_a = record.largest_current_a, .angle_rad = first.angle_rad};
-  MotorResiduals<Model> residuals(predictor, unknowns, trial, e);
+  MotorResiduals<Model> motors(predictor, unknowns, trial, e);
+  const Residuals residuals{
+      .values = [&](const Eigen::VectorXd& at, Eigen::VectorXd& out) { return motors.values(at, out); },
+      .derivatives = [&](const Eigen::VectorXd& at,
+                         Eigen::MatrixXd& out) { return motors.derivatives(at, out); }};
   const auto model_at = [&](const Eigen::VectorXd& z) {
     put(unknowns, z, trial);
     predictor.correct(errors_of(trial));
@@ -137,8 +151,10 @@ Fit fit_in_rounds(const PredictorRecord& record, const Settings& e, Predictor<Mo
       noise.current_a = first.current_a;
       noise = likeliest(predictor, model_at(fit.at), noise, least, most);
     }
-    residuals.split_weight = round == 0 ? kHeldSplit : 1.0;
-    fit = gauss_newton(residuals, fit.at, kLargestChange, is_saturated(trial) ? kNearStep : 0.0);
+    motors.split_weight = round == 0 ? kHeldSplit : 1.0;
+    const bool last = round + 1 >= rounds || round > 1;
+    fit = gauss_newton(residuals, fit.at,
+                       {.limit = kLargestChange, .near = kNearStep, .small = last ? kFinely : kRoughly});
     if (round == 0 && fit.sum > kHopeless * static_cast<double>(predictor.rows())) fit.found = false;
     if (round > 1 && stands(noise, before)) break;
   }

@@ -1,6 +1,7 @@
 #include "clients/identification/refinement/sensor_unknowns.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <iterator>
 #include <string>
 #include <string_view>
@@ -60,7 +61,14 @@ SensorErrors errors_of(const Result& result) {
   return errors;
 }
 
-void set_apart(const Settings& e, Result& result) {
+void set_apart(const Settings& e, const std::vector<Unknown>& unknowns, bool explained, Result& result) {
+  constexpr double kWidest = 0.1;
+  for (const Unknown& unknown : unknowns) {
+    Estimate& error = *result.find(unknown.name);
+    if (!is_sensor(error)) continue;
+    const double widest = unknown.scale > 0.0 ? kWidest / kOffset * unknown.scale : kWidest;
+    if (!explained || !(error.interval.value_or(HUGE_VAL) < widest)) error.interval.reset();
+  }
   const auto motor = std::stable_partition(result.parameters.begin(), result.parameters.end(),
                                            [](const Estimate& each) { return !is_sensor(each); });
   std::move(motor, result.parameters.end(), std::back_inserter(result.sensors));

@@ -17,7 +17,10 @@ void add_sensors(const Settings& settings, const PredictorRecord& record, Result
 /// The errors in the parameters of a result.
 SensorErrors errors_of(const Result& result);
 
-/// Moves them from the parameters to Result::sensors, and says what the data cannot tell.
-void set_apart(const Settings& settings, Result& result);
+/// Moves them from the parameters to Result::sensors, and says what the data cannot tell. An error that
+/// nothing explains, or whose interval is wider than a tenth, of a gain or of the largest signal, loses its
+/// number.
+void set_apart(const Settings& settings, const std::vector<Unknown>& unknowns, bool explained,
+               Result& result);
 
 }  // namespace drivebench::identification

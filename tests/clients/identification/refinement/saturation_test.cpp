@@ -58,6 +58,18 @@ TEST(Saturation, AMotorThatSaturatesShowsItsCurve) {
   }
 }
 
+// At rest the encoder shows one count for many samples, 0.4 counts from the shaft. Catches: that error as
+// noise, new in every sample: J and tau_L then lie at 2.1 of their intervals, in every noise.
+TEST(Saturation, TheFirstCountOfAMotorAtRestIsOneError) {
+  const Saturated c(31);
+  const Result r = identify(c.run.data, c.run.how);
+  ASSERT_TRUE(r.excitation.sufficient) << to_markdown(r);
+  for (const std::size_t k : {4U, 5U}) {
+    const Estimate& e = *r.find(saturated_draw().identified[k].name);
+    EXPECT_LT(std::abs(e.value - c.motor[k]), *e.interval) << to_markdown(r);
+  }
+}
+
 // Voltages of another instant look like iron that bends: half a period late or early costs a straight motor
 // 18 % of L_S with a curve. Catches: a curve that takes over an error of the record.
 TEST(Saturation, AWrongShiftOfTheVoltagesIsNoCurve) {

@@ -116,6 +116,41 @@ TEST(SensorErrors, AGainThatAllCurrentsShareGoesIntoTheParameters) {
   EXPECT_NE(to_markdown(r).find("goes into the parameters as it is"), std::string::npos);
 }
 
+// A DC motor has one current: nothing stands beside it. Catches: a search that looks for nothing and reports
+// that it found gains.
+TEST(SensorErrors, TheGainsOfADcMotorAreRefused) {
+  Case c(MotorKind::kDc);
+  c.run.how.sensors.gains = true;
+  try {
+    identify(c.run.data, c.run.how);
+    FAIL() << "a gain was looked for";
+  } catch (const IdentificationError& error) {
+    EXPECT_NE(std::string(error.what()).find("looks like another R, L, K_T and J"), std::string::npos)
+        << error.what();
+  }
+}
+
+// Of a motor that is refused no error is known, and of one that stands nearly still no gain. Catches: "+- 0"
+// beside a start value, in text or JSON, and a number that noise made.
+TEST(SensorErrors, OneThatTheDataDoNotTellShowsNoNumber) {
+  Case wrong(MotorKind::kPmSynchronous);
+  wrong.run.how.sensors = {.current_offsets = true, .gains = true};
+  Case part = wrong;
+  wrong.run.how.pole_pairs = 53;
+  part.run.how.processing.from_s = 0.0;
+  part.run.how.processing.to_s = 0.002;
+  for (const Case& c : {wrong, part}) {
+    const Result r = identify(c.run.data, c.run.how);
+    EXPECT_FALSE(r.excitation.sufficient);
+    ASSERT_FALSE(r.sensors.empty());
+    for (const Estimate& e : r.sensors)
+      EXPECT_EQ(sensor_text(e), e.name + ": the data do not tell");
+    EXPECT_NE(to_json(r).find("\"i_b_a gain\": {\n      \"estimate\": null,\n      \"interval\": null"),
+              std::string::npos)
+        << to_json(r);
+  }
+}
+
 // Catches: an hour's record that takes an hour, or a part of it that passes for the whole.
 TEST(Refinement, ALongRecordIsCutAndSaysSo) {
   Case c(MotorKind::kDc);

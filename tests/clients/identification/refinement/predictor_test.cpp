@@ -1,0 +1,67 @@
+#include <gtest/gtest.h>
+
+#include <string>
+#include <vector>
+
+#include "clients/identification/identify.hpp"
+#include "clients/identification/motors/motor_models.hpp"
+#include "clients/identification/refinement/rounds.hpp"
+#include "tests/clients/identification/monte_carlo/random_motors.hpp"
+
+namespace drivebench::identification {
+namespace {
+
+/// The column of each unknown by differences of whole runs, less that of the variational equations, over its
+/// length.
+template <class Model>
+std::vector<double> errors_of_derivatives(const MotorDraw& draw) {
+  constexpr double kDifference = 1e-4;
+  Recorded run = record_motor(draw, 1, 1);
+  run.how.processing.to_s = run.how.processing.from_s + 0.1;
+  run.how.sensors = {.current_offsets = true,
+                     .voltage_offsets = true,
+                     .zero = draw.kind == MotorKind::kPmSynchronous,
+                     .gains = true};
+  Result trial = identify_by_equations(run.data, run.how);
+  const PredictorRecord record = record_of(run.data, run.how);
+  std::vector<Unknown> unknowns = unknowns_of(run.how, trial, record.largest_speed, 0.1);
+  add_sensors(run.how, record, trial, unknowns);
+  Predictor<Model> predictor(record, Model(trial, run.how));
+  predictor.linearise(Model(trial, run.how), first_noise(record, run.how));
+  const MotorResiduals<Model> residuals(predictor, unknowns, trial, run.how);
+  Eigen::VectorXd at = coordinates_of(unknowns, trial);
+  Eigen::MatrixXd derivatives;
+  EXPECT_TRUE(residuals.derivatives(at, derivatives));
+  std::vector<double> errors;
+  for (Eigen::Index k = 0; k < at.size(); ++k) {
+    Eigen::VectorXd more;
+    Eigen::VectorXd less;
+    for (const double sign : {1.0, -1.0}) {
+      Eigen::VectorXd there = at;
+      there(k) += sign * kDifference;
+      EXPECT_TRUE(residuals.values(there, sign > 0.0 ? more : less));
+    }
+    const Eigen::VectorXd column = (more - less) / (2.0 * kDifference);
+    errors.push_back((derivatives.col(k) - column).norm() / column.norm());
+  }
+  return errors;
+}
+
+void expect_small(const std::vector<double>& errors) {
+  constexpr double kMost = 0.01;  // a step is a fifth of the fastest time constant at most, and its middle
+                                  // stands for all of it: the square of that over 24, and some for friction
+  for (std::size_t k = 0; k < errors.size(); ++k)
+    EXPECT_LT(errors[k], kMost) << "unknown " << k;
+}
+
+// Of every parameter of every kind of motor, and of every error of its sensors. Catches: a column that
+// forgets what the innovations do to the state, an offset or a gain of the voltages with the other sign, a
+// frame that does not turn with the encoder's zero, a first state that moves with nothing.
+TEST(Predictor, ItsDerivativesAreThoseOfItsInnovations) {
+  expect_small(errors_of_derivatives<InductionModel>(motor_draws()[1]));
+  expect_small(errors_of_derivatives<PmModel>(motor_draws()[2]));
+  expect_small(errors_of_derivatives<BldcModel>(motor_draws()[3]));
+}
+
+}  // namespace
+}  // namespace drivebench::identification
