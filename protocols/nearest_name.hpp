@@ -27,7 +27,8 @@ inline std::size_t edit_distance(std::string_view a, std::string_view b) {
 }
 
 /// The candidate that an unknown name most likely means: the first that contains it, or else the first with
-/// the smallest edit distance, if that is at most 2 letters or a third of the name. Empty if there is none,
+/// the smallest edit distance, if that is at most 2 letters or a third of the name and a letter stays. Empty
+/// if there is none,
 /// or if the name is longer than 64 bytes, which bounds the time that a hostile file takes. `name_of` gives
 /// the name of a candidate, which must outlive the call.
 template <class Range, class NameOf = std::identity>
@@ -39,7 +40,7 @@ std::string_view nearest_name(std::string_view name, const Range& candidates, Na
   for (const auto& candidate : candidates) {
     const std::string_view known = std::invoke(name_of, candidate);
     const std::size_t distance = known.find(name) != std::string_view::npos ? 0 : edit_distance(name, known);
-    if (distance < fewest) {
+    if (distance < fewest && distance < std::max(name.size(), known.size())) {
       nearest = known;
       fewest = distance;
     }

@@ -5,11 +5,13 @@
 #include <array>
 #include <chrono>
 #include <csignal>
+#include <filesystem>
 #include <nlohmann/json.hpp>
 #include <thread>
 
 #include "protocols/document.hpp"
 #include "protocols/mcap/mcap_series.hpp"
+#include "protocols/text.hpp"
 #include "server/access/audit.hpp"
 #include "server/command_line.hpp"
 #include "server/config/config.hpp"
@@ -37,6 +39,14 @@ enum ExitCode { kOk = 0, kFailed = 1, kUnusable = 2, kTooLate = 3 };
 
 /// Loads the bench file; implausible values are refused unless --allow-odd accepts them.
 BenchConfig load_plausible(const ServerOptions& o) {
+  if (const std::filesystem::path file(o.config);
+      !file.has_parent_path() && !file.has_extension() && !std::filesystem::exists(file)) {
+    throw ConfigError(
+        {{o.config,
+          0,
+          {},
+          fmt::format("is no file; `drivebench serve {}` finds a bench by its name", printable(o.config))}});
+  }
   std::vector<ConfigProblem> odd;
   BenchConfig config = load_config(o.config, odd);
   if (odd.empty()) return config;

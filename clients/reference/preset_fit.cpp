@@ -121,8 +121,12 @@ std::string misfit_text(const AxisView& view, const control::Preset& preset,
   for (const std::string& each : found)
     text += "\n  " + each;
   if (view.description().machine_kind().empty()) return text;  // anything would fit
-  for (const control::Preset* const other : fitting_presets(view))
+  const std::vector<const control::Preset*> fitting = fitting_presets(view);
+  for (const control::Preset* const other : fitting)
     text += fmt::format("\n  {} would fit", other->name);
+  if (fitting.empty())
+    text +=
+        "\n  no other preset fits either: this bench needs a controller of your own, such as own_motor.py";
   return text;
 }
 

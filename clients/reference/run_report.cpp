@@ -9,6 +9,7 @@
 #include "clients/reference/answers.hpp"
 #include "clients/reference/fault_text.hpp"
 #include "protocols/number_text.hpp"
+#include "protocols/signals/unit_suffix.hpp"
 
 namespace drivebench::reference {
 namespace {
@@ -140,8 +141,10 @@ std::vector<ReportRow> rows_of(const ControlReport& r) {
   known("peak phase current, asked for", r.peak_command_current_a, "A");
   known("peak phase voltage, applied", r.peak_voltage_v, "V");
   counted("samples at a limit", r.saturated_samples);
-  for (const auto& [name, value] : r.peak_telemetry)
-    row("peak " + name, value, "");
+  for (const auto& [telemetry, value] : r.peak_telemetry) {
+    const NameWithUnit parts = split_unit(telemetry);
+    row(fmt::format("peak {}", parts.name), value, parts.unit);
+  }
   row("duration", r.duration_s * 1e3, "ms of the bench's time");
   if (r.wall_s > 0.0) row("wall time", r.wall_s * 1e3, "ms");
   counted("samples", r.samples);

@@ -9,26 +9,6 @@ namespace {
 constexpr std::size_t kColumns = 80;
 constexpr std::size_t kTextColumn = 26;
 
-/// The text in lines that start at `column`, but the first, which starts where the caller is.
-std::string wrapped(std::string_view text, std::size_t column) {
-  std::string out;
-  std::size_t at = column;
-  while (!text.empty()) {
-    const std::string_view word = text.substr(0, text.find(' '));
-    text.remove_prefix(std::min(text.size(), word.size() + 1));
-    if (at > column && at + 1 + word.size() > kColumns) {
-      out += "\n" + std::string(column, ' ');
-      at = column;
-    } else if (at > column) {
-      out += ' ';
-      ++at;
-    }
-    out += word;
-    at += word.size();
-  }
-  return out + "\n";
-}
-
 /// A name with its text in the second column, or below it if the name is long.
 std::string row(const std::string& name, const std::string& text) {
   std::string out = "  " + name;
@@ -70,6 +50,25 @@ void add_rows(std::string& out, const std::string& heading, const LineVerb& verb
 }
 
 }  // namespace
+
+std::string wrapped(std::string_view text, std::size_t column) {
+  std::string out;
+  std::size_t at = column;
+  while (!text.empty()) {
+    const std::string_view word = text.substr(0, text.find(' '));
+    text.remove_prefix(std::min(text.size(), word.size() + 1));
+    if (at > column && at + 1 + word.size() > kColumns) {
+      out += "\n" + std::string(column, ' ');
+      at = column;
+    } else if (at > column) {
+      out += ' ';
+      ++at;
+    }
+    out += word;
+    at += word.size();
+  }
+  return out + "\n";
+}
 
 std::string help_text(const LineVerb& verb) {
   std::string out = wrapped(joined(verb.path, " ") + ": " + verb.text, 0) + "\n" + usage(verb);

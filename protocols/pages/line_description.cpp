@@ -1,5 +1,7 @@
 #include "protocols/pages/line_description.hpp"
 
+#include "protocols/pages/limits.hpp"
+
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cstdlib>
@@ -127,23 +129,6 @@ void arrange(std::vector<LineVerb>& verbs, const std::vector<VerbGroup>& groups)
   }
   std::ranges::move(verbs, std::back_inserter(arranged));
   verbs = std::move(arranged);
-}
-
-/// `1 - 127` in words. A limit that is there only so that numbers cannot overflow is not told.
-std::string range_in_words(const std::string& range) {
-  const std::size_t dash = range.find(" - ");
-  if (dash == std::string::npos) return "";
-  const std::string low = range.substr(0, dash);
-  const std::string high = range.substr(dash + 3);
-  const double least = std::strtod(low.c_str(), nullptr);
-  const double most = std::strtod(high.c_str(), nullptr);
-  constexpr double kNoLimit = 1e6;
-  constexpr double kAlmostZero = 1e-4;
-  const bool almost_zero = least > 0.0 && least <= kAlmostZero;
-  const std::string from = almost_zero ? "more than 0" : low;
-  if (most < kNoLimit) return almost_zero ? from + ", at most " + high : from + " to " + high;
-  if (least <= -kNoLimit) return "";
-  return almost_zero ? from : from + " or more";
 }
 
 std::string with_names(std::string_view before, const std::vector<std::string>& names) {

@@ -90,6 +90,38 @@ std::string about_unknown_word(const CLI::App& app, std::string_view otherwise) 
   return "`" + path_of(verb) + "` has no option " + printable(name) + did_you_mean(name, known);
 }
 
+/// `Could not convert: --repeat = 0.5`: validators refuse what a real number may not be, so that the option
+/// takes whole ones.
+std::string about_conversion(const std::string& text) {
+  const std::size_t start = std::strlen("Could not convert: ");
+  const std::size_t equals = text.find(" = ", start);
+  if (equals == std::string::npos) return text;
+  const std::string value = text.substr(equals + 3);
+  double number = 0.0;
+  const bool is_number = CLI::detail::lexical_cast(value, number);
+  return text.substr(start, equals - start) + ": " + printable(value) +
+         (is_number ? " is not a whole number" : " is not a number");
+}
+
+/// `--format: matt not in {csv,mat}`, as CLI11 refuses what is no word of a choice.
+std::string about_choice(const std::string& text) {
+  const std::size_t list = text.find(" not in {");
+  const std::size_t start = text.find(": ");
+  if (list == std::string::npos || start > list || !text.ends_with('}')) return text;
+  const std::string value = text.substr(start + 2, list - start - 2);
+  std::vector<std::string> words = {""};
+  for (const char each :
+       text.substr(list + std::strlen(" not in {"), text.size() - 1 - list - std::strlen(" not in {"))) {
+    if (each == ',') {
+      words.emplace_back();
+    } else {
+      words.back() += each;
+    }
+  }
+  return text.substr(0, start) + ": '" + printable(value) + "' is none of " + joined(words, ", ") +
+         did_you_mean(value, words);
+}
+
 /// CLI11's message about an error, without its words for types and verbs.
 std::string in_our_words(const CLI::App* app, const CLI::Error& error) {
   std::string text = error.what();
@@ -98,6 +130,10 @@ std::string in_our_words(const CLI::App* app, const CLI::Error& error) {
     text = about_unknown_word(*app, lacks_verb ? "a verb is missing" : text);
   } else if (error.get_name() == "ArgumentMismatch" && text.ends_with(" missing")) {
     text = text.substr(0, text.find(": ")) + ": its value is missing";
+  } else if (error.get_name() == "ConversionError" && text.starts_with("Could not convert: ")) {
+    text = about_conversion(text);
+  } else if (error.get_name() == "ValidationError") {
+    text = about_choice(text);
   }
   return text + "\nRun with --help for more information.\n";
 }

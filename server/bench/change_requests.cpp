@@ -7,6 +7,7 @@
 #include "plant/injected_faults.hpp"
 #include "plant/parameters/drive_rows.hpp"
 #include "plant/parameters/parameters.hpp"
+#include "protocols/nearest_name.hpp"
 #include "protocols/text.hpp"
 
 namespace drivebench {
@@ -59,12 +60,21 @@ std::string problem_with_write(const ChangeView& axis, std::uint32_t row, double
   return {};
 }
 
+std::string unknown_parameter(const AxisParameters& parameters, std::string_view name) {
+  return "there is no parameter '" + printable(name) + "'" +
+         did_you_mean(name, axis_parameters(parameters), &Parameter::name);
+}
+
+std::string unknown_fault(std::string_view name) {
+  return "there is no fault '" + printable(name) + "'" +
+         did_you_mean(name, kInjectableFaults, &InjectableFault::name);
+}
+
 JudgedRequest judge_parameter(const ChangeView& axis, std::string_view name, double value,
                               std::uint64_t ramp_ticks, std::uint64_t at_tick) {
   const Parameter* const row = find_parameter(axis.parameters, name);
   if (row == nullptr) {
-    return RefusedRequest{TcpRefusal::kUnknownParameter, "there is no parameter '" + printable(name) + "'",
-                          "name"};
+    return RefusedRequest{TcpRefusal::kUnknownParameter, unknown_parameter(axis.parameters, name), "name"};
   }
   if (!row->live) {
     return RefusedRequest{TcpRefusal::kReadOnly,
@@ -97,7 +107,7 @@ JudgedRequest judge_load(double load_nm, std::uint64_t ramp_ticks, std::uint64_t
 JudgedRequest judge_fault(std::string_view name, double value, std::uint64_t at_tick) {
   const std::size_t row = find_injectable_fault(name);
   if (row == kInjectableFaultCount) {
-    return RefusedRequest{TcpRefusal::kUnknownFault, "there is no fault '" + printable(name) + "'", "name"};
+    return RefusedRequest{TcpRefusal::kUnknownFault, unknown_fault(name), "name"};
   }
   if (const std::string problem = problem_with(kInjectableFaults[row], value); !problem.empty()) {
     return RefusedRequest{code_for(value), std::string(name) + " " + problem, "value"};

@@ -37,6 +37,10 @@ std::string problem_with_value(const ChangeView& axis, std::uint32_t row, double
 /// The reason why a parameter cannot have this value now; empty: it can.
 std::string problem_with_write(const ChangeView& axis, std::uint32_t row, double value);
 
+/// The sentences about names that are not there, with the nearest one that is.
+std::string unknown_parameter(const AxisParameters& parameters, std::string_view name);
+std::string unknown_fault(std::string_view name);
+
 /// A parameter: at once (`at_tick` not above the current tick) it is checked against all rules, for a later
 /// tick against its own limits.
 JudgedRequest judge_parameter(const ChangeView& axis, std::string_view name, double value,

@@ -8,7 +8,9 @@
 #include "plant/parameters/drive_rows.hpp"
 #include "plant/parameters/parameters.hpp"
 #include "protocols/document.hpp"
+#include "protocols/nearest_name.hpp"
 #include "protocols/text.hpp"
+#include "server/bench/change_requests.hpp"
 #include "server/bench/terminals.hpp"
 #include "server/experiments/plan_shapes.hpp"
 
@@ -64,7 +66,8 @@ std::vector<const Signal*> signals_of(const v1::RunExperiment& r) {
     const Signal* const signal = find_signal(r.signals(i));
     if (signal == nullptr) {
       throw BadRequest(v1::REFUSAL_UNKNOWN_SIGNAL, field,
-                       "there is no signal '" + printable(r.signals(i)) + "'");
+                       "there is no signal '" + printable(r.signals(i)) + "'" +
+                           did_you_mean(r.signals(i), kSignals, &Signal::name));
     }
     if (std::find(signals.begin(), signals.end(), signal) != signals.end()) {
       throw BadRequest(v1::REFUSAL_OUT_OF_RANGE, field, r.signals(i) + " is named twice");
@@ -80,8 +83,7 @@ std::uint32_t row_of(const v1::NamedValue& wanted, const BenchConfig& config, st
   const AxisParameters& p = config.setup.axes[axis].parameters;
   const Parameter* const row = find_parameter(p, wanted.name());
   if (row == nullptr) {
-    throw BadRequest(v1::REFUSAL_UNKNOWN_PARAMETER, field + ".name",
-                     "there is no parameter '" + printable(wanted.name()) + "'");
+    throw BadRequest(v1::REFUSAL_UNKNOWN_PARAMETER, field + ".name", unknown_parameter(p, wanted.name()));
   }
   if (config.setup.axes[axis].shares_shaft_with && row->name.starts_with("mechanics.")) {
     throw BadRequest(v1::REFUSAL_READ_ONLY, field + ".name",
@@ -162,8 +164,7 @@ Action action_of(const v1::ExperimentEvent& e, const ExperimentPlan& plan, std::
     case v1::ExperimentEvent::kFault: {
       const std::size_t row = find_injectable_fault(e.fault().name());
       if (row == kInjectableFaultCount) {
-        throw BadRequest(v1::REFUSAL_UNKNOWN_FAULT, field + ".fault.name",
-                         "there is no fault '" + printable(e.fault().name()) + "'");
+        throw BadRequest(v1::REFUSAL_UNKNOWN_FAULT, field + ".fault.name", unknown_fault(e.fault().name()));
       }
       if (const std::string problem = problem_with(kInjectableFaults[row], e.fault().value());
           !problem.empty()) {

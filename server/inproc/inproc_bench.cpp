@@ -7,6 +7,7 @@
 #include "protocols/abi/edges.hpp"
 #include "protocols/leg_edges.hpp"
 #include "protocols/text.hpp"
+#include "server/bench/change_requests.hpp"
 #include "server/bench/state_limits.hpp"
 #include "server/config/sections/plausible.hpp"
 
@@ -153,7 +154,7 @@ int InprocBench::get(std::uint32_t axis, const char* name, double& value) noexce
   const AxisParameters& p = bench_.axis(axis).parameters();
   const Parameter* const row = find_parameter(p, name);
   if (row == nullptr) {
-    return fail(DRIVEBENCH_UNKNOWN_PARAMETER, "there is no parameter '" + printable(name) + "'", "names");
+    return fail(DRIVEBENCH_UNKNOWN_PARAMETER, unknown_parameter(p, name), "names");
   }
   value = row->get(p);
   return DRIVEBENCH_OK;

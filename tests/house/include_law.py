@@ -22,7 +22,7 @@ NARROWER = {
     "protocols/signals": ("protocols/signals",),
     "clients/models": ("clients/models", "protocols/signals"),
     "clients/control": ("clients/control", "clients/models", "protocols/signals", "protocols/nearest_name.hpp"),
-    "clients/identification": ("clients/identification", "clients/models", "protocols/signals"),
+    "clients/identification": ("clients/identification", "clients/models", "protocols/signals", "protocols/number_text.hpp"),
     "clients/link": ("clients/link", "protocols"),
     "clients/regression": ("clients/regression", "protocols"),
 }

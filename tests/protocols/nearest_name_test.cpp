@@ -40,6 +40,8 @@ TEST(NearestName, IsEmptyWithoutANearCandidate) {
   EXPECT_EQ(nearest_name("perxx", std::array<std::string_view, 1>{"perio"}), "perio");
   EXPECT_EQ(nearest_name(std::string(65, 'a'), std::vector{std::string(65, 'a')}), "");
   EXPECT_EQ(nearest_name("any", std::vector<std::string>()), "");
+  EXPECT_EQ(nearest_name("xy", std::array<std::string_view, 2>{"im", "dc"}), "");
+  EXPECT_EQ(nearest_name("ac", std::array<std::string_view, 2>{"im", "dc"}), "dc");
 }
 
 // Catches: a refusal that suggests nothing where it could, and a list that lacks a candidate.

@@ -55,15 +55,19 @@ void add_watch(CommandLine& line) {
   add_link(sub, o.link);
   begin_group(sub, kWhat);
   add_axis_option(sub, o.axis);
-  sub.add_option("--signals", o.signals,
-                 "names of signals, separated by commas; default: the usual ones of the axis")
+  sub.add_option(
+         "--signals", o.signals,
+         "names of signals, separated by commas, shown behind tick and time_s; default: the usual ones "
+         "of the axis")
       ->type_name("SIGNAL")
       ->delimiter(',');
   begin_group(sub, kLimits);
-  sub.add_option("--rate", o.rate_hz, "samples per second of the bench's time")
+  sub.add_option(
+         "--rate", o.rate_hz,
+         "samples per second of the bench's time; default: 10, in lockstep 1000, so that a move of 0.1 s "
+         "shows")
       ->type_name("HZ")
-      ->check(finite_between(1e-6, kMost))
-      ->capture_default_str();
+      ->check(finite_between(1e-6, kMost));
   sub.add_option("--count", o.count, "end after this many samples; 0: go on until Ctrl-C")
       ->type_name("NUMBER")
       ->check(not_negative())
@@ -102,7 +106,9 @@ void add_set(CommandLine& line) {
   sub.add_option("NAME", o.name, "name of the parameter; `drivebench describe` lists them")
       ->type_name("NAME")
       ->required();
-  sub.add_option("VALUE", o.value, "a number in the parameter's unit, or a word if it is a choice")
+  sub.add_option(
+         "VALUE", o.value,
+         "a number in the parameter's unit, a word if it is a choice, true or false if it is a switch")
       ->type_name("VALUE")
       ->required();
   begin_group(sub, kLimits);

@@ -3,8 +3,10 @@
 #include <fmt/core.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdio>
+#include <cstdlib>
 
 #include "clients/command/bench/bench_json.hpp"
 #include "clients/command/common/basics/errors.hpp"
@@ -55,19 +57,53 @@ class HeldAxis {
   bool holds_;
 };
 
-void tell(bool json, HeldAxis& axis, std::string_view name, double value, std::string_view unit,
+/// A value that a user asks for.
+struct Wanted {
+  double value;
+  const std::string& written;  ///< as the user wrote it
+};
+
+/// `5.85 ohm`; `phase 2` where the value is the number of a thing.
+std::string with_unit(const Wanted& wanted, std::string_view unit) {
+  constexpr auto kThings = std::to_array<std::string_view>({"phase", "pair", "line", "winding"});
+  if (unit.empty() || unit == "1") return wanted.written;
+  if (std::ranges::count(kThings, unit) == 0) return fmt::format("{} {}", wanted.written, unit);
+  return wanted.value == 0.0 ? wanted.written : fmt::format("{} {}", unit, wanted.written);
+}
+
+void tell(bool json, HeldAxis& axis, std::string_view name, const Wanted& wanted, std::string_view unit,
           std::uint64_t tick) {
   if (json) {
-    fmt::print("{}\n", change_json(axis.number(), name, value, tick));
+    fmt::print("{}\n", change_json(axis.number(), name, wanted.value, tick));
   } else {
-    fmt::print("axis {} ({}): {} = {:g}{}{} from tick {} on\n", axis.number(), axis.description().name(),
-               name, value, unit.empty() || unit == "1" ? "" : " ", unit == "1" ? "" : unit, tick);
+    fmt::print("axis {} ({}): {} = {} from tick {} on\n", axis.number(), axis.description().name(), name,
+               printable(with_unit(wanted, unit)), tick);
   }
 }
 
-/// A number, or one of the words of a choice.
+/// The tick that the bench answers to a request; its refusal has the value as the user wrote it.
+template <class Request>
+std::uint64_t asked_of(const Wanted& wanted, Request request) {
+  try {
+    return request();
+  } catch (const link::RefusalError& refused) {
+    link::refuse(refused.code(), as_written(refused.what(), wanted.value, printable(wanted.written)),
+                 refused.field());
+  }
+}
+
+bool is_switch(const v1::ParameterDescription& row) {
+  return row.integer() && row.words().empty() && row.minimum() == 0.0 && row.maximum() == 1.0;
+}
+
+/// A number, one of the words of a choice, or of a switch true or false, as bench files write it.
 double value_of(const v1::ParameterDescription& row, const std::string& text) {
   if (const auto value = finite_number(text)) return *value;
+  if (is_switch(row)) {
+    if (text == "true") return 1.0;
+    if (text == "false") return 0.0;
+    throw UsageError(fmt::format("'{}' is not true or false for {}", printable(text), row.name()));
+  }
   const auto word = std::find(row.words().begin(), row.words().end(), text);
   if (word != row.words().end()) return static_cast<double>(word - row.words().begin());
   throw UsageError(fmt::format("'{}' is not {} {}{}", printable(text),
@@ -87,9 +123,11 @@ int run_inject(const InjectOptions& options) {
                                  printable(options.fault),
                                  did_you_mean(options.fault, faults, &v1::InjectableFaultDescription::name)));
   }
-  const std::uint64_t tick =
-      axis.link().inject_fault(axis.number(), {.name = options.fault, .value = options.value});
-  tell(options.json, axis, options.fault, options.value, fault->unit(), tick);
+  const Wanted wanted = {.value = std::strtod(options.value.c_str(), nullptr), .written = options.value};
+  const std::uint64_t tick = asked_of(wanted, [&] {
+    return axis.link().inject_fault(axis.number(), {.name = options.fault, .value = wanted.value});
+  });
+  tell(options.json, axis, options.fault, wanted, fault->unit(), tick);
   return kExitOk;
 }
 
@@ -103,12 +141,15 @@ int run_set(const SetOptions& options) {
                                  printable(options.name),
                                  did_you_mean(options.name, rows, &v1::ParameterDescription::name)));
   }
-  const double value = value_of(*row, options.value);
+  const Wanted wanted = {.value = value_of(*row, options.value), .written = options.value};
   const double ticks = std::round(options.ramp_s / axis.bench().period_s());
   if (ticks > 0x1p53) throw UsageError(fmt::format("--ramp-s {:g} is too long", options.ramp_s));
-  const std::uint64_t tick = axis.link().write_parameter(
-      axis.number(), {.name = options.name, .value = value, .ramp_ticks = static_cast<std::uint64_t>(ticks)});
-  tell(options.json, axis, options.name, value, row->unit(), tick + static_cast<std::uint64_t>(ticks));
+  const auto ramp_ticks = static_cast<std::uint64_t>(ticks);
+  const std::uint64_t tick = asked_of(wanted, [&] {
+    return axis.link().write_parameter(
+        axis.number(), {.name = options.name, .value = wanted.value, .ramp_ticks = ramp_ticks});
+  });
+  tell(options.json, axis, options.name, wanted, row->unit(), tick + ramp_ticks);
   return kExitOk;
 }
 
@@ -148,8 +189,11 @@ int run_take(const TakeOptions& options) {
 
 int run_bump(const BumpOptions& options) {
   HeldAxis axis(options.link, options.axis, "bump");
-  const std::uint64_t tick = axis.link().bump_shaft(axis.number(), options.impulse_nms);
-  tell(options.json, axis, "bump", options.impulse_nms, "N*m*s", tick);
+  const Wanted wanted = {.value = std::strtod(options.impulse_nms.c_str(), nullptr),
+                         .written = options.impulse_nms};
+  const std::uint64_t tick =
+      asked_of(wanted, [&] { return axis.link().bump_shaft(axis.number(), wanted.value); });
+  tell(options.json, axis, "bump", wanted, "N*m*s", tick);
   return kExitOk;
 }
 

@@ -13,7 +13,7 @@ struct InjectOptions {
   bool json = false;
   std::string axis{};  ///< number or name
   std::string fault{};
-  double value = 0.0;
+  std::string value{};  ///< a number
 };
 int run_inject(const InjectOptions& options);
 
@@ -23,7 +23,7 @@ struct SetOptions {
   bool json = false;
   std::string axis{};  ///< number or name
   std::string name{};
-  std::string value{};  ///< a number, or a word of a choice
+  std::string value{};  ///< a number, a word of a choice, or true or false
   double ramp_s = 0.0;  ///< in the bench's time; 0: a step
 };
 int run_set(const SetOptions& options);
@@ -32,8 +32,8 @@ int run_set(const SetOptions& options);
 struct BumpOptions {
   LinkChoice link{};
   bool json = false;
-  std::string axis{};  ///< number or name
-  double impulse_nms = 0.0;
+  std::string axis{};         ///< number or name
+  std::string impulse_nms{};  ///< a number
 };
 int run_bump(const BumpOptions& options);
 

@@ -2,21 +2,39 @@
 
 #include <fmt/core.h>
 
+#include <algorithm>
+#include <cstddef>
 #include <cstdio>
 #include <string>
+#include <string_view>
 
 #include "clients/command/bench/bench_json.hpp"
 #include "clients/command/common/basics/errors.hpp"
 #include "clients/command/common/session/session.hpp"
 #include "clients/link/tcp/mode_name.hpp"
+#include "protocols/number_text.hpp"
 
 namespace drivebench::command {
 namespace {
 
-/// A choice shows its word.
+/// A choice shows its word, and a whole number all of its digits.
 std::string value_text(const v1::ParameterDescription& p) {
   const bool is_word = p.value() >= 0.0 && p.value() < p.words_size();
-  return is_word ? p.words(static_cast<int>(p.value())) : fmt::format("{:.6g}", p.value());
+  if (is_word) return p.words(static_cast<int>(p.value()));
+  return p.integer() ? fmt::format("{:.0f}", p.value()) : number_text(p.value());
+}
+
+std::string limits_text(double minimum, double maximum) {
+  return fmt::format("{} .. {}", number_text(minimum), number_text(maximum));
+}
+
+/// The widest text of a column, its heading and two blanks included.
+template <class Rows, class Text>
+std::size_t column_width(std::string_view heading, const Rows& rows, Text text) {
+  std::size_t width = heading.size();
+  for (const auto& row : rows)
+    width = std::max(width, std::string_view(text(row)).size());
+  return width + 2;
 }
 
 std::string words_text(const v1::ParameterDescription& p) {
@@ -37,29 +55,38 @@ void print_axis(int number, const v1::AxisDescription& axis) {
 }
 
 void print_parameters(const v1::AxisDescription& axis) {
-  fmt::print("  {:<36}{:>12} {:<11}{:>22}  {}\n", "parameter", "value", "unit", "limits", "meaning");
-  for (const v1::ParameterDescription& p : axis.parameters()) {
-    fmt::print("  {:<36}{:>12} {:<11}{:>22}  {}{}\n", p.name(), value_text(p), p.unit(),
-               fmt::format("{:g} .. {:g}", p.minimum(), p.maximum()), p.live() ? "[live] " : "", p.meaning());
-    if (!p.words().empty()) fmt::print("  {:<38}{}\n", "", words_text(p));
+  const auto& rows = axis.parameters();
+  const std::size_t name =
+      column_width("parameter", rows, [](const auto& p) { return std::string_view(p.name()); });
+  const std::size_t value = column_width("value", rows, value_text);
+  const std::size_t unit =
+      column_width("unit", rows, [](const auto& p) { return std::string_view(p.unit()); });
+  fmt::print("  {:<{}}{:>{}} {:<{}}{:>22}  {}\n", "parameter", name, "value", value, "unit", unit, "limits",
+             "meaning");
+  for (const v1::ParameterDescription& p : rows) {
+    fmt::print("  {:<{}}{:>{}} {:<{}}{:>22}  {}{}\n", p.name(), name, value_text(p), value, p.unit(), unit,
+               limits_text(p.minimum(), p.maximum()), p.live() ? "[live] " : "", p.meaning());
+    if (!p.words().empty()) fmt::print("  {:<{}}{}\n", "", name + 2, words_text(p));
   }
 }
 
 void print_signals(const v1::BenchDescription& bench) {
-  fmt::print("\n  {:<20}{:<8}{:<8}{}\n", "signal", "unit", "kind", "meaning");
+  const std::size_t name =
+      column_width("signal", bench.signals(), [](const auto& s) { return std::string_view(s.name()); });
+  fmt::print("\n  {:<{}}{:<8}{:<8}{}\n", "signal", name, "unit", "kind", "meaning");
   for (const v1::SignalDescription& s : bench.signals()) {
     const char* kind = s.kind() == v1::SignalDescription::KIND_TRUTH    ? "truth"
                        : s.kind() == v1::SignalDescription::KIND_SENSOR ? "sensor"
                                                                         : "status";
-    fmt::print("  {:<20}{:<8}{:<8}{}\n", s.name(), s.unit(), kind, s.meaning());
+    fmt::print("  {:<{}}{:<8}{:<8}{}\n", s.name(), name, s.unit(), kind, s.meaning());
   }
 }
 
 void print_injectable(const v1::BenchDescription& bench) {
   fmt::print("\n  {:<26}{:<8}{:>16}  {}\n", "injectable fault", "unit", "limits", "meaning");
   for (const v1::InjectableFaultDescription& f : bench.injectable_faults()) {
-    fmt::print("  {:<26}{:<8}{:>16}  {}\n", f.name(), f.unit(),
-               fmt::format("{:g} .. {:g}", f.minimum(), f.maximum()), f.meaning());
+    fmt::print("  {:<26}{:<8}{:>16}  {}\n", f.name(), f.unit(), limits_text(f.minimum(), f.maximum()),
+               f.meaning());
   }
 }
 

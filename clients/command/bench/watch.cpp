@@ -25,9 +25,12 @@ constexpr auto kSilence = 1000ms;  // of the bench, that is told: so long, and t
 constexpr auto kKeyTime = 50ms;    // until a key acts
 constexpr auto kBlockTime = 30ms;  // between two blocks, however fast the bench runs
 
-/// The default signals: those of the terminals that the machine has.
+constexpr double kUsualRate_hz = 10.0;       // samples per second of the bench's time
+constexpr double kLockstepRate_hz = 1000.0;  // where a move of 0.1 s is a whole run
+
+/// The default signals beside the time: those of the terminals that the machine has.
 std::vector<std::string> usual_signals(const v1::AxisDescription& axis) {
-  std::vector<std::string> names = {"tick", "state", "faults", "injected", "encoder_count", "i_a_a"};
+  std::vector<std::string> names = {"state", "faults", "injected", "encoder_count", "i_a_a"};
   if (axis.phases() >= 2) names.emplace_back("i_b_a");
   if (axis.phases() >= 3) names.emplace_back("i_c_a");
   names.emplace_back("u_a_v");
@@ -36,6 +39,12 @@ std::vector<std::string> usual_signals(const v1::AxisDescription& axis) {
   if (axis.field_winding()) names.insert(names.end(), {"i_f_a", "u_f_v"});
   names.insert(names.end(), {"angle_rad", "speed_rad_s"});
   return names;
+}
+
+/// The signals to show behind tick and time, which every form of the view has anyway.
+std::vector<const Signal*> watched_signals(const WatchOptions& options, const v1::AxisDescription& axis) {
+  if (options.signals.empty()) return signals_named(usual_signals(axis));
+  return signals_named(without_time(options.signals));
 }
 
 /// `i_a_a [A]`; a plain number has no unit.
@@ -54,11 +63,7 @@ class View {
       : form_(form),
         bench_(bench),
         axis_(axis),
-        screen_(bench, axis,
-                signals_named(options.signals.empty() ? usual_signals(bench.axes(static_cast<int>(axis)))
-                                                      : options.signals),
-                speaks_utf8()),
-        has_time_(options.signals.empty()) {
+        screen_(bench, axis, watched_signals(options, bench.axes(static_cast<int>(axis))), speaks_utf8()) {
     if (form_ == Form::kLines) fmt::print(stderr, "watch: {}\n", watch_title(bench_, axis_));
     if (form_ == Form::kBlock) keyboard_.emplace();
   }
@@ -138,11 +143,10 @@ class View {
       heads += fmt::format("  {:>12}", head);
       values += fmt::format("  {:>{}}", value, std::max<std::size_t>(head.size(), 12));
     };
-    for (const Signal* signal : signals()) {
+    add("tick", fmt::format("{}", sample.tick));
+    add("time_s", fmt::format("{:.6f}", static_cast<double>(sample.tick) * bench_.period_s()));
+    for (const Signal* signal : signals())
       add(heading(*signal), watched_text(*signal, sample, bench_));
-      if (has_time_ && signal->name == "tick")
-        add("time_s", fmt::format("{:.6f}", static_cast<double>(sample.tick) * bench_.period_s()));
-    }
     if (!is_started_) fmt::print("{}\n", heads);
     fmt::print("{}\n", values);
   }
@@ -152,7 +156,6 @@ class View {
   std::uint32_t axis_;
   WatchScreen screen_;
   std::optional<Keyboard> keyboard_{};  // of a block
-  bool has_time_;                       // the signals are the usual ones, so that a column of time fits
   bool is_started_ = false;
   bool has_news_ = false;  // a sample that the block does not show yet
   std::chrono::steady_clock::time_point next_draw_{};
@@ -171,8 +174,7 @@ std::vector<std::string> names_of(const std::vector<const Signal*>& signals) {
 std::string silence_text(v1::Mode mode) {
   if (mode != v1::MODE_LOCKSTEP) return "the bench sends no samples; waiting";
   return "in lockstep time stands still until a controller drives the bench, `drivebench control` for "
-         "example; "
-         "the values go on then";
+         "example; the values go on then";
 }
 
 /// How long a bench may be silent that owes a sample every so many seconds.
@@ -190,11 +192,13 @@ bool is_driven(const v1::Status& status) {
 }  // namespace
 
 int run_watch(const WatchOptions& options) {
-  signals_named(options.signals);  // reports a wrong name before it looks for a bench
+  signals_named(without_time(options.signals));  // reports a wrong name before it looks for a bench
   link::Link bench_link = open_link(options.link, "watch");
   const v1::BenchDescription& bench = bench_link.welcome().bench();
   const std::uint32_t axis = axis_number(bench, options.axis);
-  const double ticks = std::clamp(std::round(1.0 / (options.rate_hz * bench.period_s())), 1.0, 4e9);
+  const double rate_hz =
+      options.rate_hz.value_or(bench.mode() == v1::MODE_LOCKSTEP ? kLockstepRate_hz : kUsualRate_hz);
+  const double ticks = std::clamp(std::round(1.0 / (rate_hz * bench.period_s())), 1.0, 4e9);
   const bool is_terminal = ::isatty(STDOUT_FILENO) != 0;
   catch_interrupts();
   View view(options.json  ? View::Form::kJson

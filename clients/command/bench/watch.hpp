@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -13,7 +14,7 @@ struct WatchOptions {
   bool json = false;
   std::string axis = "0";              ///< number or name
   std::vector<std::string> signals{};  ///< empty: the usual ones of the axis
-  double rate_hz = 10.0;               ///< in the bench's time
+  std::optional<double> rate_hz{};     ///< in the bench's time; else as the mode needs it
   std::uint64_t count = 0;             ///< 0: until interrupted
 };
 int run_watch(const WatchOptions& options);

@@ -9,6 +9,8 @@
 #include <limits>
 #include <string_view>
 
+#include "protocols/number_text.hpp"
+
 namespace drivebench::command {
 namespace {
 
@@ -41,7 +43,7 @@ bool is_one_of(std::string_view unit, std::span<const std::string_view> units) {
 
 std::string shown_value(const Signal& signal, const Sample& sample) {
   if (signal.type != SignalType::kReal) return fmt::format("{:.0f}", value_of(signal, sample));
-  return fmt::format("{:.6g}", displayed(signal, sample));
+  return number_text(displayed(signal, sample));
 }
 
 std::string value_with_unit(const Signal& signal, const Sample& sample, bool utf8) {
@@ -56,7 +58,7 @@ std::string value_with_unit(const Signal& signal, const Sample& sample, bool utf
       std::ranges::find_if(kPrefixes, [rounded](const Prefix& each) { return rounded >= each.factor; });
   const Prefix prefix = row == kPrefixes.end() ? kPrefixes.back() : *row;
   const std::string_view text = prefix.text == "µ" && !utf8 ? "u" : prefix.text;
-  return fmt::format("{:.5g} {}{}", value / prefix.factor, text, signal.unit);
+  return fmt::format("{} {}{}", number_text(value / prefix.factor), text, signal.unit);
 }
 
 bool has_curve(const Signal& signal) noexcept {

@@ -9,7 +9,7 @@
 
 namespace drivebench::command {
 
-/// A value with six digits. A magnitude far below the usual range of the signal shows as 0.
+/// A value as number_text() writes it. A magnitude far below the usual range of the signal shows as 0.
 std::string shown_value(const Signal& signal, const Sample& sample);
 
 /// The same with its unit and a prefix: `-1.2346 mA`. Without UTF-8 a millionth is `u`.

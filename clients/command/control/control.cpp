@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "clients/command/common/basics/errors.hpp"
+#include "clients/command/common/basics/text.hpp"
 #include "clients/command/common/session/session.hpp"
 #include "clients/command/control/control_axis.hpp"
 #include "clients/command/control/control_json.hpp"
@@ -16,6 +17,7 @@
 #include "clients/command/control/control_run.hpp"
 #include "clients/link/tcp/mode_name.hpp"
 #include "clients/reference/preset_fit.hpp"
+#include "protocols/text.hpp"
 
 namespace drivebench::command {
 namespace {
@@ -35,7 +37,8 @@ void apply_settings(link::AxisLink& bench, const std::vector<ParameterSetting>& 
     try {
       bench.write_parameter(setting.name, setting.value);
     } catch (const link::RefusalError& refused) {
-      throw UsageError(fmt::format("--set {}: {}", setting.name, refused.what()));
+      throw UsageError(fmt::format("--set {}: {}", setting.name,
+                                   as_written(refused.what(), setting.value, printable(setting.written))));
     }
   }
 }
@@ -78,7 +81,7 @@ void write_csv(std::ofstream out, const ControlOptions& options, const ControlRu
 void print_report(const ControlReport& r) {
   fmt::print("{} on axis {} of bench {}, {}\n", r.preset, r.axis, r.bench, r.mode);
   for (const reference::ReportRow& row : reference::rows_of(r))
-    fmt::print("  {:<34}{:>12} {}\n", row.name, row.value, row.unit);
+    fmt::print("  {:<34}{:>12}{}{}\n", row.name, row.value, row.unit.empty() ? "" : " ", row.unit);
 }
 
 /// One move, from rest to its report.

@@ -14,6 +14,7 @@ namespace drivebench::command {
 struct ParameterSetting {
   std::string name;
   double value = 0.0;
+  std::string written{};  ///< the value as the user wrote it
 };
 
 struct ControlOptions {

@@ -40,7 +40,7 @@ LoadAt parse_load(std::string_view text) {
 /// `machine.rotor_resistance_ohm=5.85`.
 ParameterSetting parse_setting(std::string_view text) {
   const auto [name, value] = split(text, '=', "NAME=VALUE");
-  return {.name = std::string(name), .value = number(value, text)};
+  return {.name = std::string(name), .value = number(value, text), .written = std::string(value)};
 }
 
 /// An option that may be given several times, each text parsed into one of `values`.

@@ -21,6 +21,9 @@
 #include "clients/control/loop/run.hpp"
 #include "clients/reference/preset_fit.hpp"
 #include "protocols/mcap/time_base.hpp"
+#include "protocols/nearest_name.hpp"
+#include "protocols/signals/unit_suffix.hpp"
+#include "protocols/text.hpp"
 
 namespace drivebench::command {
 namespace {
@@ -154,13 +157,15 @@ Panel panel_named(std::string_view name, const RecordedRun& run, const Plan& pla
   }
   if (std::ranges::count(kEstimatePanels, name) != 0) return estimate_panel(name, run, estimates);
   if (const auto found = estimates.telemetry.find(name); found != estimates.telemetry.end()) {
-    return {.label = std::string(name), .lines = {{"controller", found->second}}};
+    return {.label = axis_title(name, split_unit(name).unit.empty() ? "1" : split_unit(name).unit),
+            .lines = {{"controller", found->second}}};
   }
-  std::string more;
+  std::vector<std::string> known(kPlainPanels.begin(), kPlainPanels.end());
+  known.insert(known.end(), kEstimatePanels.begin(), kEstimatePanels.end());
   for (const auto& [telemetry, values] : estimates.telemetry)
-    more += ", " + telemetry;
-  throw UsageError(fmt::format("no panel '{}'; there are {}, {}{}", name, fmt::join(kPlainPanels, ", "),
-                               fmt::join(kEstimatePanels, ", "), more));
+    known.push_back(telemetry);
+  throw UsageError(fmt::format("no panel '{}'{}; there are {}", printable(name), did_you_mean(name, known),
+                               fmt::join(known, ", ")));
 }
 
 /// The trajectory over the recorded samples; the recording is cut where the run has ended.
@@ -203,6 +208,11 @@ Estimates estimated(const PlotOptions& options, const RecordedRun& recorded) {
   return out;
 }
 
+/// Of a panel whose curves have names of their own.
+std::string unit_title(std::string_view unit) {
+  return unit == "1" || unit == "enum" || unit == "bits" ? "number" : fmt::format("[{}]", unit);
+}
+
 /// Whether a panel needs the estimates; refuses panels that need a preset where there is none.
 bool needs_estimates(const std::vector<std::string>& names, bool has_preset) {
   bool found = false;
@@ -215,15 +225,27 @@ bool needs_estimates(const std::vector<std::string>& names, bool has_preset) {
   return found;
 }
 
-/// A panel for each unit, in the order of the names.
+/// A panel for each unit, in the order of the names. One of a single signal has its name.
 std::vector<Panel> panels_of_signals(const std::vector<std::string>& names, const RecordedRun& run) {
-  std::vector<Panel> panels;
+  std::vector<std::vector<const Signal*>> groups;
   for (const Signal* signal : signals_named(names)) {
-    const std::string label = fmt::format("[{}]", signal->unit);
-    auto panel = std::ranges::find(panels, label, &Panel::label);
-    if (panel == panels.end()) panel = panels.insert(panel, {.label = label, .lines = {}});
-    panel->lines.push_back({std::string(signal->name),
-                            column(run, [&](const Answered& row) { return value_of(*signal, row.sample); })});
+    const auto group = std::ranges::find(groups, signal->unit, [](const auto& of) { return of[0]->unit; });
+    if (group == groups.end()) {
+      groups.push_back({signal});
+    } else if (std::ranges::count(*group, signal) == 0) {
+      group->push_back(signal);
+    }
+  }
+  std::vector<Panel> panels;
+  for (const std::vector<const Signal*>& group : groups) {
+    const Signal& first = *group.front();
+    Panel panel{.label = group.size() == 1 ? axis_title(first.name, first.unit) : unit_title(first.unit),
+                .lines = {}};
+    for (const Signal* signal : group)
+      panel.lines.push_back(
+          {std::string(split_unit(signal->name).name),
+           column(run, [&](const Answered& row) { return value_of(*signal, row.sample); })});
+    panels.push_back(std::move(panel));
   }
   return panels;
 }

@@ -1,6 +1,8 @@
 #include <fmt/core.h>
 
+#include <algorithm>
 #include <array>
+#include <cmath>
 #include <numbers>
 
 #include "clients/command/common/basics/errors.hpp"
@@ -9,6 +11,7 @@
 #include "clients/control/math/frames.hpp"
 #include "clients/models/two_phase.hpp"
 #include "protocols/json.hpp"
+#include "protocols/number_text.hpp"
 
 namespace drivebench::command {
 namespace {
@@ -48,11 +51,16 @@ int run_convert_frame(const ConvertFrameOptions& options) {
     fmt::print("{}\n", json_text(out));
     return kExitOk;
   }
-  fmt::print("phases a, b, c          {:12.6g}{:12.6g}{:12.6g}   (zero sequence {:.6g})\n", phases[0] + zero,
-             phases[1] + zero, phases[2] + zero, zero);
+  // What the rounding of the others leaves of a zero is one.
+  const double largest = std::max(std::hypot(x.a, x.b), std::abs(zero));
+  const auto text = [largest](double value) {
+    return number_text(std::abs(value) < 1e-12 * largest ? 0.0 : value);
+  };
+  fmt::print("phases a, b, c          {:>12}{:>12}{:>12}   (zero sequence {})\n", text(phases[0] + zero),
+             text(phases[1] + zero), text(phases[2] + zero), text(zero));
   const auto row = [&](const char* name, double scale) {
-    fmt::print("{:<24}{:12.6g}{:12.6g}{:12.6g}{:12.6g}\n", name, scale * x.a, scale * x.b, scale * dq.d,
-               scale * dq.q);
+    fmt::print("{:<24}{:>12}{:>12}{:>12}{:>12}\n", name, text(scale * x.a), text(scale * x.b),
+               text(scale * dq.d), text(scale * dq.q));
   };
   fmt::print("\n{:<24}{:>12}{:>12}{:>12}{:>12}   d axis at {:g} degrees\n", "", "alpha", "beta", "d", "q",
              options.angle_deg);

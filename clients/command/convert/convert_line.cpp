@@ -45,18 +45,18 @@ void add_winding(CommandLine& line, CLI::App& convert) {
   begin_group(sub, "The winding");
   sub.add_option("--slots", o.slots, "slots of the whole stator")
       ->type_name("NUMBER")
-      ->check(CLI::Range(1, 10'000));
+      ->check(whole_between(1, 10'000));
   sub.add_option("--poles", o.poles, "poles of the winding, two for each pole pair")
       ->type_name("NUMBER")
-      ->check(CLI::Range(2, 1'000))
+      ->check(whole_between(2, 1'000))
       ->capture_default_str();
   sub.add_option("--phases", o.phases, "phases of the winding")
       ->type_name("NUMBER")
-      ->check(CLI::Range(1, 100))
+      ->check(whole_between(1, 100))
       ->capture_default_str();
   sub.add_option("--pitch", o.pitch_slots, "slots that a coil spans; default: a whole pole")
       ->type_name("SLOTS")
-      ->check(CLI::Range(1, 10'000));
+      ->check(whole_between(1, 10'000));
   sub.add_option("--angles-deg", o.angles_deg,
                  "electrical angles of equal loops, instead of slots; separated by commas")
       ->type_name("DEGREES")

@@ -65,6 +65,10 @@ std::string command_of(const MotorKind& kind, const NewMotorOptions& o, const Sh
   return text + (o.sheet.delta ? " --delta" : "");
 }
 
+constexpr const char* kTwoPhases =
+    "; three phases as their two-phase equivalent, power-invariant:\n"
+    "# amplitudes times sqrt(3/2), so that power and torque need no factor";
+
 }  // namespace
 
 int run_new_motor(const MotorKind& kind, const NewMotorOptions& options) {
@@ -80,11 +84,9 @@ int run_new_motor(const MotorKind& kind, const NewMotorOptions& options) {
 
   const std::string name = options.name.empty() ? fmt::format("{} motor", kind.name) : options.name;
   std::string text = fmt::format(
-      "# {}, as its data sheet has it. SI units; three phases as their two-phase equivalent, "
-      "power-invariant:\n"
-      "# amplitudes times sqrt(3/2), so that power and torque need no factor.\n"
+      "# {}, as its data sheet has it. SI units{}.\n"
       "# Made by: {}\n",
-      printable(name), made_by);
+      printable(name), kind.phases ? kTwoPhases : "", made_by);
   for (const std::string& remark : remarks) {
     text += fmt::format("# Note: {}.\n", remark);
     fmt::print(stderr, "note: {}\n", remark);

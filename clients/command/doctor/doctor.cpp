@@ -10,6 +10,7 @@
 #include "clients/command/common/basics/errors.hpp"
 #include "clients/command/common/basics/json.hpp"
 #include "protocols/json.hpp"
+#include "protocols/pages/help_text.hpp"
 #include "protocols/text.hpp"
 
 namespace drivebench::command {
@@ -22,9 +23,11 @@ const char* health_word(Health health) {
 
 void print_table(const char* title, const std::vector<HostFinding>& findings) {
   fmt::print("{}\n", title);
+  constexpr std::size_t kColumn = 25;  // of the sentences
   for (const HostFinding& f : findings) {
-    fmt::print("  {:<8}{:<14} {}; {}{}{}\n", health_word(f.health), printable(f.name), printable(f.what),
-               f.why, f.mend.empty() ? "" : ". Mend: ", f.mend);
+    fmt::print("  {:<8}{:<14} {}", health_word(f.health), printable(f.name),
+               pages::wrapped(fmt::format("{}; {}", printable(f.what), f.why), kColumn));
+    if (!f.mend.empty()) fmt::print("{:{}}{}", "", kColumn, pages::wrapped("Mend: " + f.mend, kColumn));
   }
 }
 

@@ -25,6 +25,7 @@
 #include "clients/identification/motors/motors.hpp"
 #include "clients/identification/named_experiments.hpp"
 #include "protocols/document.hpp"
+#include "protocols/nearest_name.hpp"
 #include "protocols/text.hpp"
 
 namespace drivebench::command {
@@ -60,9 +61,14 @@ const NamedExperiment* chosen_experiment(const MotorName& motor, const std::stri
     if (each.motor == motor.name && (choice.empty() || each.name == choice)) return &each;
   }
   if (choice.ends_with(".toml")) return nullptr;
+  std::vector<std::string_view> known;
+  for (const NamedExperiment& each : identification::named_experiments()) {
+    if (each.motor == motor.name) known.push_back(each.name);
+  }
   throw UsageError(fmt::format(
-      "--experiment '{}' is not known for --motor {}; there are {}, and files that end with .toml",
-      printable(choice), motor.name, identification::experiment_names(motor.name)));
+      "--experiment '{}' is not known for --motor {}{}; there are {}, and files that end with .toml",
+      printable(choice), motor.name, did_you_mean(choice, known),
+      identification::experiment_names(motor.name)));
 }
 
 MeasuredMotor measured_motor(const IdentifyOptions& options, const MotorName& motor,

@@ -57,14 +57,16 @@ void add_filters(CLI::App& sub, IdentifyOptions& o) {
   corner("--current-hz", o.current_hz, "corner of the zero-phase filter of the currents; 0: none");
   corner("--voltage-hz", o.voltage_hz, "corner of the filter of the voltages; 0: none");
   corner("--shaft-hz", o.shaft_hz, "corner of the filter of angle and speed; 0: none");
-  sub.add_option("--order", o.order, "order of these filters")->type_name("NUMBER")->check(CLI::Range(1, 10));
+  sub.add_option("--order", o.order, "order of these filters")
+      ->type_name("NUMBER")
+      ->check(whole_between(1, 10));
 }
 
 void add_settings(CLI::App& sub, IdentifyOptions& o) {
   begin_group(sub, "How data become equations (default: what bench, recording and experiment say)");
   sub.add_option("--pole-pairs", o.pole_pairs, "pole pairs of the motor; --from CSV finds them in the data")
       ->type_name("NUMBER")
-      ->check(CLI::Range(1, 1000));
+      ->check(whole_between(1, 1000));
   sub.add_option("--counts", o.counts_per_revolution,
                  "counts of encoder_count in a revolution; 0: angle_rad counts")
       ->type_name("COUNTS")
@@ -110,7 +112,7 @@ void add_suggestion(CLI::App& sub, IdentifyOptions& o) {
         "length of the record; default: that of the motor's first experiment");
   sub.add_option("--trials", o.suggestion.trials, "largest number of experiments that are tried")
       ->type_name("NUMBER")
-      ->check(CLI::Range(1, 250))
+      ->check(whole_between(1, 250))
       ->capture_default_str()
       ->needs("--suggest");
   sub.add_option("--suggest-file", o.suggestion.file, "write the experiment (.toml), for --experiment")
@@ -156,7 +158,7 @@ void add_track_settings(CLI::App& sub, TrackOptions& o) {
       ->check(finite_between(1e-6, 0.999999));
   sub.add_option("--pole-pairs", o.data.pole_pairs, "pole pairs of the motor")
       ->type_name("NUMBER")
-      ->check(CLI::Range(1, 1000));
+      ->check(whole_between(1, 1000));
   sub.add_option("--counts", o.data.counts_per_revolution, "counts of encoder_count in a revolution")
       ->type_name("COUNTS")
       ->check(finite_between(0.0, 1e9));
@@ -209,7 +211,7 @@ void add_filter(CommandLine& line) {
   begin_group(sub, "The filter");
   sub.add_option("--order", o.order, "order of the filter")
       ->type_name("NUMBER")
-      ->check(CLI::Range(1, 10))
+      ->check(whole_between(1, 10))
       ->capture_default_str();
   sub.add_option("--cutoff-hz", o.cutoff_hz, "corner of the filter")
       ->type_name("HZ")

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "clients/command/recording/svg_plot.hpp"
+#include "protocols/signals/unit_suffix.hpp"
 
 namespace drivebench::command {
 namespace {
@@ -63,7 +64,7 @@ std::string validation_text(const IdentifyReport& r) {
 /// Adds measured less re-simulated to the panel of its unit.
 void add_residual(std::vector<Panel>& panels, const Resimulated& signal) {
   const std::string label = fmt::format("residual [{}]", signal.unit);
-  PlotLine line{.name = signal.name, .values = {}};
+  PlotLine line{.name = std::string(split_unit(signal.name).name), .values = {}};
   for (std::size_t k = 0; k < signal.measured.size(); ++k)
     line.values.push_back(signal.measured[k] - signal.simulated[k]);
   auto panel = std::ranges::find(panels, label, &Panel::label);
@@ -132,7 +133,7 @@ std::string identify_plot(const IdentifyReport& r) {
   const identification::Resimulation& v = *r.validation;
   std::vector<Panel> panels;
   for (const Resimulated& signal : v.signals) {
-    panels.push_back({.label = fmt::format("{} [{}]", signal.name, signal.unit),
+    panels.push_back({.label = axis_title(signal.name, signal.unit),
                       .lines = {{"measured", signal.measured}, {"re-simulated", signal.simulated}}});
   }
   for (const Resimulated& signal : v.signals)

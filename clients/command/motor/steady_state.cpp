@@ -33,9 +33,9 @@ void write(const std::string& file, const std::string& text) {
 
 void print_table(const InductionMotorFile& file, const InductionCircuit& circuit,
                  const std::vector<NamedPoint>& points) {
-  fmt::print("{}: {} phases, {:g} V rms each, {:g} Hz; synchronous {:.6g} rad/s, sigma {:.6g}\n", file.name,
-             circuit.phases(), circuit.voltage_v, circuit.frequency_hz, circuit.synchronous_rad_s(),
-             circuit.motor.leakage());
+  fmt::print("{}: {} phases, {:g} V rms each, {:g} Hz; synchronous {} rad/s, sigma {}\n", file.name,
+             circuit.phases(), circuit.voltage_v, circuit.frequency_hz,
+             number_text(circuit.synchronous_rad_s()), number_text(circuit.motor.leakage()));
   if (circuit.line_resistance_ohm > 0.0 || circuit.line_inductance_h > 0.0) {
     fmt::print(
         "behind {:g} ohm and {:g} H in each phase: the power and cos phi of the line are before these\n",

@@ -26,12 +26,19 @@
 #include "protocols/mcap/time_base.hpp"
 #include "protocols/sample_codec.hpp"
 #include "protocols/signals/catalogue.hpp"
+#include "protocols/text.hpp"
 
 namespace drivebench::command {
 namespace {
 
 /// Bytes between two writes of text and two updates of the progress.
 constexpr std::size_t kPiece = 1U << 16U;
+
+/// The format that the name of the output promises: csv where it promises none.
+std::string format_of(const std::string& out_file) {
+  const std::string suffix = std::filesystem::path(out_file).extension().string();
+  return suffix == ".mat" || suffix == ".h5" ? "mat" : suffix == ".mf4" ? "mdf" : "csv";
+}
 
 /// The named signals; without names all but the tick, which begins every row.
 std::vector<const Signal*> chosen_signals(const std::vector<std::string>& names) {
@@ -218,7 +225,7 @@ Exported export_frames(McapSeries& reader, const ExportOptions& options, const M
   out.flush();
   done.problem = problem_of(reader, end);
   done.rows = frames.frames();
-  done.axis = options.axis.empty() ? "*" : options.axis;
+  done.axis = options.axis;
   done.other_axes = channels.others();
   return done;
 }
@@ -251,7 +258,9 @@ Exported export_table(McapSeries& reader, const ExportOptions& options, const Si
 
 }  // namespace
 
-int run_export(const ExportOptions& options) {
+int run_export(const ExportOptions& line) {
+  ExportOptions options = line;
+  if (options.format.empty()) options.format = format_of(options.out_file);
   const bool is_table = options.format != "candump";
   const MappedSeries files = open_recording(options.recording);
   McapSeries reader(files.segments());
@@ -268,12 +277,16 @@ int run_export(const ExportOptions& options) {
 
   std::FILE* const told = options.out_file.empty() ? stderr : stdout;  // standard output may be the data
   if (options.json) {
-    Json json{{"out", options.out_file}, {"axis", done.axis}, {"rows", done.rows}, {"problem", done.problem}};
+    Json json{{"out", options.out_file},
+              {"axis", is_table || !done.axis.empty() ? done.axis : "*"},
+              {"rows", done.rows},
+              {"problem", done.problem}};
     if (epoch) json["epoch_unix_ns"] = *epoch;
     fmt::print(told, "{}\n", json_text(json));
   } else {
-    fmt::print(told, "export: {} {} of axis {}{}{}{}\n", done.rows, is_table ? "samples" : "frames",
-               done.axis.empty() ? "?" : done.axis, options.out_file.empty() ? "" : " to ", options.out_file,
+    const std::string of = done.axis.empty() ? "all axes" : "axis " + printable(done.axis);
+    fmt::print(told, "export: {} {} of {}{}{}{}\n", done.rows, is_table ? "samples" : "frames", of,
+               options.out_file.empty() ? "" : " to ", options.out_file,
                epoch ? "; in real time, tick 0 began at " + utc_text(*epoch) : "");
   }
   if (!done.problem.empty()) {

@@ -18,7 +18,7 @@ struct ExportOptions {
   std::vector<std::string> signals{};  ///< empty: all
   std::uint64_t from_tick = 0;
   std::uint64_t to_tick = std::numeric_limits<std::uint64_t>::max();
-  std::string format = "csv";      ///< or "mat", "mdf", "candump"
+  std::string format{};            ///< csv, mat, mdf or candump; empty: as the name of the file ends
   std::string interface = "can0";  ///< candump: its name in every line
   unsigned node_base = 1;          ///< candump: node id of the first axis
   bool classic = false;            ///< candump: classic frames instead of FD

@@ -38,7 +38,7 @@ void add_export(CommandLine& line) {
       ->capture_default_str();
   sub.add_option("--node-base", o.node_base, "node id of the first axis")
       ->type_name("NUMBER")
-      ->check(CLI::Range(1, 127))
+      ->check(whole_between(1, 127))
       ->capture_default_str();
   sub.add_flag("--classic", o.classic, "classic frames instead of FD");
   sub.add_option("--profile", o.profile, "keys as in a can: link, such as current_unit_a=0.01&extended=1")
@@ -46,10 +46,10 @@ void add_export(CommandLine& line) {
   begin_group(sub, kOutput);
   sub.add_option(
          "--format", o.format,
-         "csv, mat (MATLAB 7.3, which is HDF5), mdf (MDF 4.1): samples; candump: the frames of a CAN bus")
+         "csv, mat (MATLAB 7.3, which is HDF5), mdf (MDF 4.1): samples; candump: the frames of a CAN bus; "
+         "default: as the name of --out ends (.mat, .h5, .mf4), else csv")
       ->type_name("FORMAT")
-      ->check(CLI::IsMember({"csv", "mat", "mdf", "candump"}))
-      ->capture_default_str();
+      ->check(CLI::IsMember({"csv", "mat", "mdf", "candump"}));
   sub.add_option("--out", o.out_file, "write to this file; default: standard output")->type_name("FILE");
   sub.footer(
       "Example:\n"

@@ -9,6 +9,7 @@
 #include <iterator>
 
 #include "protocols/markup.hpp"
+#include "protocols/signals/unit_suffix.hpp"
 
 namespace drivebench::command {
 namespace {
@@ -185,6 +186,12 @@ void append_panel(std::string& svg, const Panel& panel, const std::vector<double
 }
 
 }  // namespace
+
+std::string axis_title(std::string_view signal, std::string_view unit) {
+  if (unit == "1" || unit == "enum" || unit == "bits") return std::string(signal);
+  const NameWithUnit parts = split_unit(signal);
+  return fmt::format("{} [{}]", parts.unit == unit ? parts.name : signal, unit);
+}
 
 std::string svg_of(std::string_view title, std::string_view x_label, const std::vector<double>& x,
                    const std::vector<Panel>& panels) {

@@ -18,6 +18,9 @@ struct Panel {
   std::vector<PlotLine> lines;
 };
 
+/// The label of an axis for a signal: `speed [rad/s]`; a plain number has no unit.
+std::string axis_title(std::string_view signal, std::string_view unit);
+
 /// Panels below each other over a common horizontal axis, as an SVG picture of 720 pixels width. Where many
 /// values fall into one pixel it draws the smallest and the largest.
 std::string svg_of(std::string_view title, std::string_view x_label, const std::vector<double>& x,

@@ -31,7 +31,7 @@ void add_rerun_command(CommandLine& line) {
           ->excludes(plant_only);
   sub.add_option("--port", o.port, "TCP port of --interactive; 0: chosen by the system")
       ->type_name("PORT")
-      ->check(CLI::Range(0U, 65535U))
+      ->check(whole_between(0, 65535))
       ->needs(interactive);
   sub.footer(
       "Example:\n"
@@ -60,7 +60,7 @@ void add_choice(CLI::App& sub, TestOptions& o) {
   sub.add_option("--jobs", o.jobs, "cases that run at the same time")
       ->type_name("NUMBER")
       ->capture_default_str()
-      ->check(CLI::Range(1U, 1024U));
+      ->check(whole_between(1, 1024));
 }
 
 void add_reports(CLI::App& sub, TestOptions& o) {
@@ -87,7 +87,7 @@ void add_reports(CLI::App& sub, TestOptions& o) {
                      "run nothing here: submit the cases to Slurm as an array of so many tasks, each "
                      "with --jobs CPUs; sbatch reads SBATCH_PARTITION and others")
           ->type_name("TASKS")
-          ->check(CLI::Range(1U, 1'000'000U))
+          ->check(whole_between(1, 1'000'000))
           ->needs(results);
   auto* const status =
       sub.add_flag("--status", o.status,
@@ -106,7 +106,7 @@ void add_reports(CLI::App& sub, TestOptions& o) {
   sub.add_option("--shrink-runs", o.shrink_runs, "the most runs that it may cost")
       ->type_name("NUMBER")
       ->capture_default_str()
-      ->check(CLI::Range(1U, 100'000U))
+      ->check(whole_between(1, 100'000))
       ->needs(shrink);
   begin_group(sub, kOutput);
   sub.add_option("--junit", o.junit_file, "write a JUnit XML report")->type_name("FILE");

@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "clients/identification/data/magnetising_curve.hpp"
+#include "protocols/number_text.hpp"
 
 namespace drivebench::identification {
 namespace {
@@ -156,16 +157,16 @@ void Result::compare(const std::map<std::string, double, std::less<>>& truth) {
 
 EstimateText text_of(const Result& r, const Estimate& e) {
   EstimateText text;
-  if (e.truth) text.truth = fmt::format("{:.6g}", *e.truth);
+  if (e.truth) text.truth = number_text(*e.truth);
   if (r.is_unseen(e.name)) {
     text.value = "not seen";
     return text;
   }
-  text.value = fmt::format("{:.6g}", e.value);
+  text.value = number_text(e.value);
   if (e.interval) text.interval = percent(*e.interval, e.value);
   if (e.truth) text.error = percent(e.value - *e.truth, *e.truth);
   const double by_equations = e.by_equations.value_or(e.value);
-  if (std::isfinite(by_equations)) text.by_equations = fmt::format("{:.6g}", by_equations);
+  if (std::isfinite(by_equations)) text.by_equations = number_text(by_equations);
   text.index = percent(e.index, by_equations);
   return text;
 }

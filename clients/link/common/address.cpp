@@ -178,6 +178,10 @@ Address parse_address(std::string_view text) {
   if (host.find('/') != std::string_view::npos) {
     bad_address(text, "a host has no '/'; a unix socket is written unix:PATH");
   }
+  if (host.ends_with(".toml")) {
+    bad_address(
+        text, "a bench file is opened in this process as inproc:FILE, or served by `drivebench serve FILE`");
+  }
   if (place.find('?') != std::string_view::npos) bad_address(text, "files behind a ? are for tls: addresses");
   if (!is_port(port)) bad_address(text, "the port must be a number from 1 to 65535");
   address.host = host;

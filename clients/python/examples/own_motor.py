@@ -39,7 +39,11 @@ d_loop, q_loop = (Pi(PHASE_H * CURRENT_LOOP_RAD_S, PHASE_OHM * CURRENT_LOOP_RAD_
 speed_gain = INERTIA_KGM2 * SPEED_LOOP_RAD_S / NM_PER_A
 speed_loop = Pi(speed_gain, speed_gain * SPEED_LOOP_RAD_S / 4, CURRENT_LIMIT_A)
 
-with drivebench.Bench(sys.argv[1] if len(sys.argv) > 1 else os.environ["DRIVEBENCH_LINK"], clear=True) as bench:
+address = sys.argv[1] if len(sys.argv) > 1 else os.environ.get("DRIVEBENCH_LINK")
+if address is None:
+    sys.exit("own_motor.py: which bench? inproc:my-bench.toml in this process, or a server such as tcp:127.0.0.1:7300")
+
+with drivebench.Bench(address, clear=True) as bench:
     bench.acquire()
     about = bench.describe()
     sample = bench.newest()

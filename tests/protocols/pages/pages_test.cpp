@@ -1,6 +1,7 @@
 #include <gtest/gtest.h>
 
 #include <CLI/CLI.hpp>
+#include <cstdint>
 #include <sstream>
 #include <string>
 #include <vector>
@@ -157,6 +158,53 @@ TEST(Pages, ErrorsSpeakInTheSameWords) {
     app.exit(error, out, problems);
   }
   EXPECT_EQ(problems.str(), "--number: its value is missing\nRun with --help for more information.\n");
+}
+
+/// What a tool with one option of each kind says about a line.
+std::string refusal_of(const std::string& line) {
+  CLI::App app("tool");
+  add_pages(app, {.name = "tool"});
+  double real = 0.0;
+  std::uint64_t whole = 0;
+  std::string text;
+  app.add_option("--rate", real)->check(finite_between(1e-6, 1e15));
+  app.add_option("--sigma", real)->check(finite_between(1e-6, 0.5));
+  app.add_option("--wait", real)->check(finite_between(0.25, 1e9));
+  app.add_option("--follow", real)->check(finite_between(0.001, 1000.0));
+  app.add_option("--any", real)->check(finite_between(-1e15, 1e15));
+  app.add_option("--port", whole)->check(whole_between(0, 65535));
+  app.add_option("--from", whole)->check(not_negative());
+  app.add_option("--format", text)->check(CLI::IsMember({"csv", "mat", "candump"}));
+  app.add_option("--phases", whole)->check(CLI::IsMember({2, 3}));
+  std::ostringstream out;
+  std::ostringstream problems;
+  try {
+    app.parse(line);
+  } catch (const CLI::ParseError& error) {
+    app.exit(error, out, problems);
+  }
+  return problems.str().substr(0, problems.str().find('\n'));
+}
+
+// Catches: a limit against overflow told as if it were one of the motor's, a number that is not told as it
+// was written, CLI11's words for a conversion and a choice, no suggestion for a misspelt word.
+TEST(Pages, RefusalsHaveTheValueAsWrittenAndTheLimitThatMatters) {
+  EXPECT_EQ(refusal_of("--rate 0"), "--rate: 0 is not a number above 0");
+  EXPECT_EQ(refusal_of("--rate nan"), "--rate: nan is not a number above 0");
+  EXPECT_EQ(refusal_of("--rate 1.50e16"), "--rate: 1.50e16 is not a number above 0 and at most 1e15");
+  EXPECT_EQ(refusal_of("--rate 1e-7"), "--rate: 1e-7 is not a number of 1e-6 or more");
+  EXPECT_EQ(refusal_of("--sigma 1e0"), "--sigma: 1e0 is not a number above 0 and at most 0.5");
+  EXPECT_EQ(refusal_of("--wait 0.20"), "--wait: 0.20 is not a number of 0.25 or more");
+  EXPECT_EQ(refusal_of("--follow 0"), "--follow: 0 is not a number from 0.001 to 1000");
+  EXPECT_EQ(refusal_of("--any x"), "--any: x is not a number");
+  EXPECT_EQ(refusal_of("--any 1e16"), "--any: 1e16 is not a number up to 1e15");
+  EXPECT_EQ(refusal_of("--port 65536"), "--port: 65536 is not a whole number from 0 to 65535");
+  EXPECT_EQ(refusal_of("--from 0.5"), "--from: 0.5 is not a whole number");
+  EXPECT_EQ(refusal_of("--from x"), "--from: x is not a number");
+  EXPECT_EQ(refusal_of("--format matt"),
+            "--format: 'matt' is none of csv, mat, candump; did you mean \"mat\"?");
+  EXPECT_EQ(refusal_of("--format qqqqq"), "--format: 'qqqqq' is none of csv, mat, candump");
+  EXPECT_EQ(refusal_of("--phases 4"), "--phases: '4' is none of 2, 3");
 }
 
 /// What a tool with the verb `new`, and in it `motor` with the options --kv-rms and --poles, says about a

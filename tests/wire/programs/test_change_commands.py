@@ -2,6 +2,7 @@
 """The subcommands of drivebench that inject faults, write parameters and take an axis, and the replay of their
 changes."""
 import pathlib
+import re
 import struct
 import sys
 import unittest
@@ -34,6 +35,9 @@ class Commands(CommandTest):
         """Catches: a fault that the status does not show, or that ends with its session."""
         said = self.drivebench("inject", "servo", "bus_sag", "0.25", link=self.link).stdout
         self.assertEqual(said, "axis 0 (servo): bus_sag = 0.25 from tick 0 on\n")
+        for value, told in (("2", "phase 2"), ("0", "0")):
+            said = self.drivebench("inject", "servo", "open_phase", value, link=self.link).stdout
+            self.assertEqual(said, f"axis 0 (servo): open_phase = {told} from tick 0 on\n")
         found = self.json_of("inject", "0", "hall_offset", "-0.5", link=self.link)
         self.assertEqual(found, {"axis": 0, "name": "hall_offset", "value": -0.5, "tick": 0})
         with self.bench.client() as client:
@@ -43,6 +47,13 @@ class Commands(CommandTest):
         self.assertSays(self.drivebench("status", link=self.link).stdout, "injected bus_sag hall_offset")
         self.assertSays(self.drivebench("describe", link=self.link).stdout, "machine induction, 2 phases (two_phase)",
                         "drive voltage_amplifier", "injectable fault", "open_phase")
+
+    def test_the_columns_of_describe_stand_below_each_other(self):
+        """Catches: a long unit or number that pushes the columns behind it to the right, as those of N*m*s/rad do."""
+        said = self.drivebench("describe", link=self.link).stdout
+        widths = [len(row) for row in re.findall(r"(?m)^  \w+\.\w+ .*?\S \.\. \S+  ", said)]
+        self.assertGreater(len(widths), 20)
+        self.assertEqual(len(set(widths)), 1, said)
 
     def test_a_conductor_disturbs_an_axis_that_a_controller_drives(self):
         """Catches: --conduct that asks for the lease, and a change that a running controller cannot see."""
@@ -62,7 +73,12 @@ class Commands(CommandTest):
         """Catches: a ramp in ticks of another bench, a word that is taken for 0."""
         said = self.drivebench("set", "servo", NAME, "5.9", "--ramp-s", "0.5e-3", link=self.link).stdout
         self.assertEqual(said, f"axis 0 (servo): {NAME} = 5.9 ohm from tick 4 on\n")
-        self.drivebench("set", "servo", "mechanics.motion", "locked", link=self.link)
+        said = self.drivebench("set", "servo", "mechanics.motion", "locked", link=self.link).stdout
+        self.assertSays(said, "mechanics.motion = locked from tick 0 on")
+        self.drivebench("set", "servo", "amplifier.over_current_trip", "true", link=self.link)
+        self.drivebench("set", "servo", "amplifier.over_current_trip", "false", link=self.link)
+        self.assertSays(self.drivebench("set", "servo", "amplifier.over_current_trip", "yes", link=self.link, code=USAGE).stderr,
+                        "'yes' is not true or false for amplifier.over_current_trip")
         with self.bench.client() as client:
             client.lease()
             seen = []

@@ -25,6 +25,7 @@ sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[2] / "helpers"))
 from command_test import (
     DRIVEBENCH, FAILED, NO_BENCH, NO_CONNECT, OK, SERVO, USAGE, CommandTest, environment, link_of, until)
 from wire_client import BENCHES, PATIENCE_S, REPOSITORY, Server, pb
+from wire_test import SERVO_TEXT
 
 
 class WithoutABench(CommandTest):
@@ -66,17 +67,19 @@ class WithoutABench(CommandTest):
     def test_a_real_number_is_finite_and_has_an_end(self):
         """Catches: naN that passes a range because no comparison with it is true, seconds that overflow the clock."""
         for arguments, option, high in (
-                (["watch"], "--rate", "1e+15"), (["set", "servo", "a", "1"], "--ramp-s", "1e+09"),
-                (["control", "--compare", "none.mcap"], "--threshold", "1e+15"),
-                (["can-log", "can:slcan:tcp:127.0.0.1:1"], "--duration", "1e+09"),
-                (["experiment", "fetch", "1"], "--patience", "1e+09"), (["identify", "--motor", "dc"], "--period", "1e+09"),
-                (["identify", "--motor", "dc"], "--counts", "1e+09"), (["identify", "--motor", "dc"], "--voltage-shift", "100"),
-                (["identify", "--motor", "dc"], "--current-hz", "1e+09"), (["identify", "--motor", "dc"], "--voltage-hz", "1e+09"),
-                (["identify", "--motor", "dc"], "--shaft-hz", "1e+09")):
+                (["watch"], "--rate", "1e15"), (["set", "servo", "a", "1"], "--ramp-s", "1e9"),
+                (["control", "--compare", "none.mcap"], "--threshold", "1e15"),
+                (["can-log", "can:slcan:tcp:127.0.0.1:1"], "--duration", "1e9"),
+                (["experiment", "fetch", "1"], "--patience", "1e9"), (["identify", "--motor", "dc"], "--period", "1e9"),
+                (["identify", "--motor", "dc"], "--counts", "1e9"), (["identify", "--motor", "dc"], "--voltage-shift", "100"),
+                (["identify", "--motor", "dc"], "--current-hz", "1e9"), (["identify", "--motor", "dc"], "--voltage-hz", "1e9"),
+                (["identify", "--motor", "dc"], "--shaft-hz", "1e9")):
             for value in ("nan", "inf", "1e300", "1e999", "-1e3", "1x"):
                 with self.subTest(f"{option} {value}"):
                     said = self.drivebench(*arguments, f"{option}={value}", code=USAGE).stderr
-                    self.assertSays(said, option, f"{value} is not a number from ", f" to {high}")
+                    self.assertSays(said, option, f"{value} is not a number")
+                    if value in ("inf", "1e300", "1e999"):  # beyond the limit, which nothing else tells
+                        self.assertSays(said, high)
         self.assertSays(self.drivebench("inject", "servo", "bus_sag", "nan", code=USAGE).stderr, "VALUE: nan is not a number")
         self.assertSays(self.drivebench("bump", "servo", "inf", code=USAGE).stderr, "IMPULSE: inf is not a number")
 
@@ -118,6 +121,20 @@ class WithoutABench(CommandTest):
         shown = self.drivebench(*words, "--line-ohm", "0.5").stdout
         self.assertIn("behind 0.5 ohm and 0 H in each phase", shown)
         self.assertIn("--line-h", self.drivebench(*words, "--line-h", "-1", code=USAGE).stderr)
+
+    def test_the_names_of_a_circle_diagram_stand_apart(self):
+        """Catches: a name drawn over another, such as that of the pull-out over that of the largest power."""
+        for motor in ("im-b", "im-8-5-5"):
+            self.drivebench("steady-state", motor, "--voltage", "120", "--frequency", "60", "--load", "1", "--circle", "circle.svg")
+            svg = (self.folder / "circle.svg").read_text(encoding="utf-8")
+            names = [(float(x), float(y), 5.5 * len(text)) for x, y, text in re.findall(r"<text x='([\d.]+)' y='([\d.]+)'>([^<]+ A)</text>", svg)]
+            self.assertEqual(len(names), 8)
+            for i, (x, y, width) in enumerate(names):
+                self.assertLess(x + width, 600)
+                for other_x, other_y, other_width in names[:i]:
+                    # A letter of 10 pixels is less than 11 high.
+                    apart = abs(y - other_y) >= 11 or x + width <= other_x or other_x + other_width <= x
+                    self.assertTrue(apart, (motor, x, y, other_x, other_y))
 
     def test_presets_are_listed(self):
         """Catches: a preset that is not listed, or that does not name its source."""
@@ -329,10 +346,19 @@ class Observing(CommandTest):
     def test_watch_prints_the_requested_number_of_samples_at_the_rate_of_the_bench(self):
         """Catches: a rate in wall time, which in lockstep means nothing; a --count that is one off."""
         head, *rows = self.watch_a_move("--count", "5", "--rate", "1000", "--signals", "tick,i_a_a,state")
-        self.assertEqual(head.split(), ["tick", "i_a_a", "[A]", "state"])
+        self.assertEqual(head.split(), ["tick", "time_s", "i_a_a", "[A]", "state"])
         ticks = [int(row.split()[0]) for row in rows]
         self.assertEqual(ticks, list(range(ticks[0], ticks[0] + 40, 8)))
-        self.assertEqual(rows[-1].split()[2], "run")
+        self.assertEqual([float(row.split()[1]) for row in rows], [tick / 8000 for tick in ticks])
+        self.assertEqual(rows[-1].split()[3], "run")
+
+    def test_watch_shows_a_short_move_in_lockstep(self):
+        """Catches: a rate of ten samples in a second of the bench's time, in which a move of 0.128 s is over; a time that is
+        no choice among the signals."""
+        head, *rows = self.watch_a_move("--count", "100", "--signals", "time_s,speed_rad_s")
+        self.assertEqual(head.split(), ["tick", "time_s", "speed_rad_s", "[rad/s]"])
+        self.assertGreater(max(float(row.split()[2]) for row in rows), 10.0)
+        self.assertEqual(len(rows), 100)
 
     def test_watch_prints_a_json_object_a_line(self):
         """Catches: a stream that cannot be read line by line."""
@@ -353,6 +379,8 @@ class Observing(CommandTest):
         for command in ("watch", "control"):
             self.assertSays(self.drivebench(command, "--axis", "7", link=self.link, code=USAGE).stderr,
                             "no axis '7'; this bench has 0 (servo)")
+            self.assertSays(self.drivebench(command, "--axis", "sevro", link=self.link, code=USAGE).stderr,
+                            "no axis 'sevro'; did you mean \"servo\"?; this bench has 0 (servo)")
 
 
 class Controlling(CommandTest):
@@ -410,8 +438,9 @@ class Controlling(CommandTest):
 
     def test_set_refuses_values_that_the_bench_refuses(self):
         """Catches: a misspelt parameter that is ignored, and a move that runs with the wrong motor."""
-        for setting, fact in (("machine.rotor_resistance=5", "there is no parameter 'machine.rotor_resistance'"),
-                              ("machine.rotor_resistance_ohm=-1", "must lie between"),
+        for setting, fact in (("machine.rotor_resistance=5", "there is no parameter 'machine.rotor_resistance'; "
+                               "did you mean \"machine.rotor_resistance_ohm\"?"),
+                              ("machine.rotor_resistance_ohm=-1.50", "machine.rotor_resistance_ohm is -1.50 but must lie between"),
                               ("machine.rotor_resistance_ohm=nan", "not a number")):
             self.assertSays(self.control("--set", setting, code=USAGE)["error"]["message"], fact)
         self.assertEqual(self.json_of("status", link=self.link)["tick"], 0)
@@ -451,6 +480,9 @@ class Controlling(CommandTest):
         """Catches: a controller of 4 kHz on a bench of 8 kHz."""
         said = self.drivebench("control", "--preset", "book/8.2.2-4khz", link=self.link, code=USAGE).stderr
         self.assertSays(said, "the sample rate [Hz] is 8000 on the bench, 4000 in the preset", "book/8.2.2 would fit")
+        odd = self.server(text=SERVO_TEXT.replace("period_us = 125", "period_us = 130"))
+        said = self.drivebench("control", link=link_of(odd), code=USAGE).stderr
+        self.assertSays(said, "the sample rate [Hz] is 7692.31 on the bench", "no other preset fits either", "own_motor.py")
 
     def test_a_link_that_breaks_in_a_move_costs_no_sample(self):
         """Catches: a report and a file of samples that are lost with the bench."""

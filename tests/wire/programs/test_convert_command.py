@@ -42,7 +42,7 @@ class Convert(CommandTest):
 
     def test_windings_and_frames(self):
         """GEN-01, P3-02. Catches: slots counted in mechanical degrees, a pitch of whole turns, the two scalings swapped, a
-        frame that turns the other way."""
+        frame that turns the other way, six digits of a rounding error in the place of zero."""
         first = self.converted("winding", "--slots", "12", "--pitch", "5")[0]
         self.assertAlmostEqual(first["winding"], 0.9330, delta=5e-5)
         four_poles = self.converted("winding", "--slots", "48", "--poles", "4")[0]
@@ -53,6 +53,8 @@ class Convert(CommandTest):
         for scaling, size in (("power_invariant", math.sqrt(6)), ("amplitude_invariant", 2.0)):
             for key, value in (("alpha", size), ("beta", 0.0), ("d", 0.0), ("q", -size)):
                 self.assertAlmostEqual(shown[scaling][key], value, delta=1e-12)
+        said = self.drivebench("convert", "frame", "--abc", "2,-1,-1", "--angle-deg", "90").stdout
+        self.assertRegex(said, r"(?m)^power-invariant +2\.4495 +0 +0 +-2\.4495$")
         back = self.converted("frame", "--dq", "0,-2", "--angle-deg", "90", "--amplitude-invariant")
         for phase, value in zip(back["abc"], (2.0, -1.0, -1.0), strict=True):
             self.assertAlmostEqual(phase, value, delta=1e-12)

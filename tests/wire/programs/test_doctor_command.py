@@ -115,7 +115,8 @@ class Doctor(CommandTest):
             self.assertEqual(found["interrupts"]["health"], "fine", (isolated, list_))
 
     def test_this_machine(self):
-        """Catches: an exit code that does not follow the findings, a measurement that is left out, text and JSON that differ."""
+        """Catches: an exit code that does not follow the findings, a measurement that is left out, text and JSON that differ, lines
+        that a terminal breaks."""
         found, code = self.doctor_here("--measure-s", 0.2, "--period-us", 1e6)
         every = found["realtime"] + found["can"]
         self.assertEqual(sum(each["health"] == "problem" for each in every), found["problems"])
@@ -126,6 +127,11 @@ class Doctor(CommandTest):
         text = self.drivebench("doctor", "--measure-s", 0, code=code).stdout
         for each in found["realtime"] + found["can"]:
             self.assertRegex(text, rf"(?m)^  {each['health']} +{each['name']} ")
+            words = " ".join(text.split())
+            self.assertIn(" ".join(f"{each['what']}; {each['why']}".split()), words)
+            self.assertIn(" ".join(each["mend"].split()), words)
+        # A word such as the path of a file is longer than a line.
+        self.assertEqual([line for line in text.splitlines() if len(line) > 80 and " " in line[25:]], [])
         self.drivebench("doctor", "--root", self.folder, code=USAGE)
 
     def doctor_here(self, *options):

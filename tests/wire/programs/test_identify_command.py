@@ -352,7 +352,8 @@ class Identify(WireTest):
         """Catches: a refusal without the possible words."""
         for words, text in (
                 (("--experiment", "dol-start"), "--motor is missing; there are im, dc, pm, bldc"),
-                (("--motor", "ac"), "--motor 'ac' is not known; there are im, dc, pm, bldc"),
+                (("--motor", "ac"), "--motor 'ac' is not known; did you mean \"dc\"?; there are im, dc, pm, bldc"),
+                (("--motor", "im", "--experiment", "no-lod"), "did you mean \"no-load\"?; there are"),
                 (("--motor", "im", "--experiment", "x"), "there are dol-start, no-load-start, dc-resistance, no-load, blocked-rotor, classical, and files"),
                 (("--motor", "im", "--experiment", "x.toml"), "no experiment file 'x.toml'"),
                 (("--motor", "im", "--map", "a=i_a_a"), "belong to --from"),

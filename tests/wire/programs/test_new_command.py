@@ -72,6 +72,12 @@ class NewTest(CommandTest):
 class MadeMotorsRun(NewTest):
     """Made, served, and driven by a short controller to the no-load point of the data sheet."""
 
+    def test_a_motor_file_speaks_of_its_motor(self):
+        """Catches: the scaling of three phases above the numbers of a motor that has none."""
+        self.assertNotIn("two-phase", self.new("motor", "dc", *DC, "--kt", "0.05").stdout)
+        self.assertIn("power-invariant:\n# amplitudes times sqrt(3/2), so that power and torque need no factor.\n# Made by: ",
+                      self.new("motor", "pm", *PM, "--kt", "0.5").stdout)
+
     def test_a_dc_motor(self):
         """Catches: a torque constant in other units, friction that is not that of the no-load current. In steady state the
         file's numbers have six digits and the run-up has e^-60 left: 0.1 %."""

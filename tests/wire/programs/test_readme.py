@@ -134,6 +134,14 @@ class Readmes(unittest.TestCase):
                 said.append(done.stdout)
             bench.moved = True
             bench.do("drivebench plot my-run.mcap --out my-run.svg")
+            program = ["/usr/bin/python3", REPOSITORY / "clients/python/examples/own_motor.py"]
+            environment = {**environment, "PYTHONPATH": str(REPOSITORY / "clients/python/src")}
+            environment.pop("DRIVEBENCH_LINK", None)
+            for words in ([], ["my-bench.toml"]):
+                done = subprocess.run([*program, *words], capture_output=True, text=True, timeout=PATIENCE_S, check=False, cwd=folder,
+                                      env=environment)
+                self.assertEqual(done.returncode, 1)
+                self.assertIn("inproc:", done.stderr)
         self.assertEqual(said[0], said[1], "in process and over TCP")
         self.assertRegex(said[2], r"(?m)^pass +my-case +1 s +3 checks$")
         demo = (REPOSITORY / "bench").read_text(encoding="utf-8").split("  demo)\n")[1].split(";;")[0]

@@ -14,6 +14,7 @@ std::vector<const Signal*> signals_named(const std::vector<std::string>& names) 
   std::vector<const Signal*> signals;
   for (const std::string& name : names) {
     const Signal* const signal = find_signal(name);
+    if (name == "time_s") throw UsageError("time_s is no signal: it stands beside the tick anyway");
     if (signal == nullptr) {
       throw UsageError(fmt::format("no signal '{}'{}; `drivebench describe` lists them", printable(name),
                                    did_you_mean(name, kSignals, &Signal::name)));
@@ -21,6 +22,11 @@ std::vector<const Signal*> signals_named(const std::vector<std::string>& names) 
     signals.push_back(signal);
   }
   return signals;
+}
+
+std::vector<std::string> without_time(std::vector<std::string> names) {
+  std::erase_if(names, [](const std::string& name) { return name == "tick" || name == "time_s"; });
+  return names;
 }
 
 std::string csv_header(const std::vector<const Signal*>& signals, std::string_view further_times) {

@@ -13,6 +13,9 @@ namespace drivebench::command {
 /// The signals with these names. Throws UsageError for an unknown name.
 std::vector<const Signal*> signals_named(const std::vector<std::string>& names);
 
+/// The names without `tick` and `time_s`, for rows that begin with these two.
+std::vector<std::string> without_time(std::vector<std::string> names);
+
 /// `tick,time_s`, the names of further times, each behind a comma, `,i_a_a [A]...` and the end of the line.
 std::string csv_header(const std::vector<const Signal*>& signals, std::string_view further_times = {});
 

@@ -7,6 +7,8 @@
 #include <string>
 #include <string_view>
 
+#include "protocols/text.hpp"
+
 namespace drivebench::command {
 
 /// The names of things, separated by commas, for errors that list the choices.
@@ -26,6 +28,14 @@ inline std::optional<double> finite_number(std::string_view text) {
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
   const bool good = error == std::errc{} && end == text.data() + text.size() && std::isfinite(value);
   return good ? std::optional(value) : std::nullopt;
+}
+
+/// A refusal with the value as the user wrote it: `1e7`, where the sentence has `is 1e+07`.
+inline std::string as_written(std::string sentence, double value, std::string_view written) {
+  const std::string told = " is " + shortest(value);
+  const std::size_t at = sentence.find(told + ' ');
+  if (at != std::string::npos) sentence.replace(at, told.size(), " is " + std::string(written));
+  return sentence;
 }
 
 }  // namespace drivebench::command

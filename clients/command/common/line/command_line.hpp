@@ -84,6 +84,7 @@ using pages::kMost_s;
 using pages::kOutput;
 using pages::kWhat;
 using pages::not_negative;
+using pages::whole_between;
 
 /// The upper limit of options without a limit of their own.
 inline constexpr double kMost = 1e15;

@@ -11,6 +11,8 @@
 #include "clients/command/common/session/inproc_axis.hpp"
 #include "clients/link/can/can_link.hpp"
 #include "clients/link/modbus/modbus_link.hpp"
+#include "protocols/nearest_name.hpp"
+#include "protocols/text.hpp"
 
 namespace drivebench::command {
 namespace {
@@ -69,7 +71,9 @@ std::uint32_t axis_number(const v1::BenchDescription& bench, std::string_view ch
   if (const auto number = find_axis(bench, choice)) return *number;
   const std::string known = listed(
       bench.axes(), [n = 0](const auto& axis) mutable { return fmt::format("{} ({})", n++, axis.name()); });
-  throw UsageError(fmt::format("no axis '{}'; this bench has {}", choice, known));
+  const std::string nearest =
+      did_you_mean(choice, bench.axes(), [](const auto& axis) -> std::string_view { return axis.name(); });
+  throw UsageError(fmt::format("no axis '{}'{}; this bench has {}", printable(choice), nearest, known));
 }
 
 void catch_interrupts() {

@@ -11,6 +11,7 @@
 #include "clients/command/common/basics/text.hpp"
 #include "clients/command/common/programs/installation.hpp"
 #include "protocols/document.hpp"
+#include "protocols/nearest_name.hpp"
 #include "protocols/text.hpp"
 
 namespace drivebench::command {
@@ -78,7 +79,8 @@ const MotorName& chosen_motor(const std::string& name) {
   if (name.empty()) throw UsageError("--motor is missing; there are " + names);
   const MotorName* const motor = identification::find_motor(name);
   if (motor == nullptr)
-    throw UsageError(fmt::format("--motor '{}' is not known; there are {}", printable(name), names));
+    throw UsageError(fmt::format("--motor '{}' is not known{}; there are {}", printable(name),
+                                 did_you_mean(name, identification::kMotorNames, &MotorName::name), names));
   return *motor;
 }
 

@@ -19,16 +19,20 @@ bool is_seen(const ResistanceEstimate& e, std::string_view name) {
   return std::ranges::find(e.excitation.unseen, name) == e.excitation.unseen.end();
 }
 
+/// An interval has two digits, so that 0.2 beside 0.25 is 0.20.
 std::string cell(bool seen, double value, double interval) {
-  return seen ? fmt::format("{} +- {:.2g}", number_text(value), interval) : "not seen";
+  if (!seen) return "not seen";
+  std::string digits = fmt::format("{:#.2g}", interval);
+  if (digits.ends_with('.')) digits.pop_back();
+  return fmt::format("{} +- {}", number_text(value), digits);
 }
 
 }  // namespace
 
 void TrackReport::heading(const std::string& source, const identification::KnownInductances& known,
                           double window_s) const {
-  fmt::print(stderr, "track: {}; L_S {:.5g} H and sigma {:.5g} are known; a window is {:g} s\n", source,
-             known.stator_inductance_h, known.leakage_factor, window_s);
+  fmt::print(stderr, "track: {}; L_S {} H and sigma {} are known; a window is {:g} s\n", source,
+             number_text(known.stator_inductance_h), number_text(known.leakage_factor), window_s);
   if (!json_)
     fmt::print("{:>10}  {:>20} {:>10}  {:>22} {:>10}  {}\n", "time [s]", "R_S [ohm], 95 %", "truth",
                "T_R [s], 95 %", "truth", "");

@@ -44,7 +44,7 @@ TEST(IdentifyReport, TheTextHasEstimateIndexTruthErrorAndVerdict) {
 TEST(IdentifyReport, PictureAndMarkdownShowTheValidation) {
   IdentifyReport report = some_report();
   const std::string svg = identify_plot(report);
-  for (const char* part : {"measured", "re-simulated", "i_a_a [A]", "speed_rad_s [rad/s]", "residual [A]",
+  for (const char* part : {"measured", "re-simulated", "i_a [A]", "speed [rad/s]", "residual [A]",
                            "residual [rad/s]", "file &lt;x&gt;"})
     EXPECT_NE(svg.find(part), std::string::npos) << part;
   // The residual of the current goes down to -0.5 A in the middle: the axis of its panel is below zero.

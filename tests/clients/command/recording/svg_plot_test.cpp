@@ -73,5 +73,14 @@ TEST(SvgPlot, TextsAreEscapedAndConstantsHaveARange) {
   EXPECT_EQ(svg.find("inf"), std::string::npos);
 }
 
+// Catches: an axis that repeats the unit, one without a name, a plain number with a unit.
+TEST(SvgPlot, AnAxisHasTheQuantityAndItsUnit) {
+  EXPECT_EQ(axis_title("speed_rad_s", "rad/s"), "speed [rad/s]");
+  EXPECT_EQ(axis_title("angle_rad", "rad"), "angle [rad]");
+  EXPECT_EQ(axis_title("true_i_a_a", "A"), "true_i_a [A]");
+  EXPECT_EQ(axis_title("encoder_count", "counts"), "encoder_count [counts]");
+  EXPECT_EQ(axis_title("state", "enum"), "state");
+}
+
 }  // namespace
 }  // namespace drivebench::command

@@ -51,6 +51,7 @@ TEST(Address, RefusesInvalidTexts) {
                                  "host:12x",
                                  "unix:",
                                  "/run/bench.sock",
+                                 "my-bench.toml",
                                  "http://host:80",
                                  "tls:",
                                  "tls:a?ca=",

@@ -8,6 +8,7 @@
 #include "protocols/sample_codec.hpp"
 #include "protocols/signals/catalogue.hpp"
 #include "protocols/text.hpp"
+#include "server/bench/change_requests.hpp"
 #include "server/bench/terminals.hpp"
 #include "server/recording/input_codec.hpp"
 
@@ -128,7 +129,7 @@ void report_parameters(Dialogue& dialogue, const v1::ReadParameters& r) {
     const Parameter* row = find_parameter(engine.parameters(r.axis()), name);
     if (row == nullptr) {
       return dialogue.refuse(dialogue.id(), v1::REFUSAL_UNKNOWN_PARAMETER,
-                             "there is no parameter '" + printable(name) + "'", "names");
+                             unknown_parameter(engine.parameters(r.axis()), name), "names");
     }
     *values.add_parameters() =
         describe_parameter(engine, r.axis(), static_cast<std::size_t>(row - table.data()));

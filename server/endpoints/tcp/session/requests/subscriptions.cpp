@@ -4,6 +4,7 @@
 
 #include <utility>
 
+#include "protocols/nearest_name.hpp"
 #include "protocols/sample_codec.hpp"
 #include "protocols/text.hpp"
 
@@ -15,8 +16,10 @@ void Subscriptions::subscribe(const v1::Subscribe& r) {
   for (const std::string& name : r.signals()) {
     const Signal* signal = find_signal(name);
     if (signal == nullptr) {
-      return dialogue_.refuse(dialogue_.id(), v1::REFUSAL_UNKNOWN_SIGNAL,
-                              "there is no signal '" + printable(name) + "'", "signals");
+      return dialogue_.refuse(
+          dialogue_.id(), v1::REFUSAL_UNKNOWN_SIGNAL,
+          "there is no signal '" + printable(name) + "'" + did_you_mean(name, kSignals, &Signal::name),
+          "signals");
     }
     mask |= SignalMask{1} << (signal - kSignals.data());
   }
