@@ -29,6 +29,7 @@
 #include "server/host/service_notification.hpp"
 #include "server/host/stop_signal.hpp"
 #include "server/interface_text.hpp"
+#include "server/pacing/pacer.hpp"
 #include "server/recording/replay.hpp"
 #include "server/replay_command.hpp"
 
@@ -105,9 +106,9 @@ void check_bus_loads(const ServerOptions& o, const BenchConfig& config) {
 }
 
 /// The non-empty buckets as [upper edge in us, count].
-nlohmann::json lateness_rows(const LatenessHistogram& lateness) {
+nlohmann::json lateness_rows(const OctaveHistogram& lateness) {
   nlohmann::json rows = nlohmann::json::array();
-  double edge_us = static_cast<double>(LatenessHistogram::kFirstEdgeNs) * 1e-3;
+  double edge_us = static_cast<double>(OctaveHistogram::kFirstEdgeNs) * 1e-3;
   for (const std::uint64_t count : lateness.buckets()) {
     if (count > 0) rows.push_back({edge_us, count});
     edge_us *= 2.0;

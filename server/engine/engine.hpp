@@ -16,6 +16,7 @@
 #include "server/engine/owners.hpp"
 #include "server/engine/tick_edges.hpp"
 #include "server/engine/watch.hpp"
+#include "server/host/octave_histogram.hpp"
 #include "server/pacing/verdict.hpp"
 #include "server/recording/recorder.hpp"
 
@@ -63,8 +64,8 @@ class Engine {
   virtual Verdict stop() = 0;
   /// The hash of the current state; 0 while another thread changes it.
   virtual std::uint64_t state_hash() const = 0;
-  /// The worst lateness so far [ns]; samples hold the number of late ticks.
-  virtual std::int64_t worst_lateness_ns() const = 0;
+  /// The latenesses of all ticks so far; empty outside real time. Samples hold the number of late ticks.
+  virtual SharedOctaveHistogram::View lateness() const { return {}; }
 
   /// Callbacks in order; added before the run and never removed.
   class Listeners {
@@ -109,6 +110,8 @@ class Engine {
   std::string sentence_of(Refused why, std::size_t axis) const;
 
   const Sample& newest(std::size_t axis) const { return newest_[axis]; }
+  /// The same of every axis.
+  std::span<const Sample> newest() const { return newest_; }
   /// The encoder edges of the tick before newest(), if a bus of the configuration sends edges.
   const TickEdges& edges(std::size_t axis) const { return edges_[axis]; }
   Tick tick() const { return static_cast<Tick>(newest_[0].tick); }

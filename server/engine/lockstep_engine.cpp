@@ -122,7 +122,6 @@ class LockstepEngine final : public Engine {
     return Engine::may_be_acquired(axis) && has_room() && !is_over();
   }
   std::uint64_t state_hash() const override { return bench_.state_hash(); }
-  std::int64_t worst_lateness_ns() const override { return 0; }
 
  private:
   std::vector<std::byte> state_at_start() const {

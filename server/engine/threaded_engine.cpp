@@ -169,7 +169,7 @@ class ThreadedEngine final : public Engine {
   }
 
   std::uint64_t state_hash() const override { return 0; }
-  std::int64_t worst_lateness_ns() const override { return clock_.worst_lateness_ns(); }
+  SharedOctaveHistogram::View lateness() const override { return clock_.shown_lateness(); }
 
   // ---- tick thread ----
 

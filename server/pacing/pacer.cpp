@@ -100,27 +100,6 @@ std::unique_ptr<Pacer> make_free_pacer() {
   return std::make_unique<FreePacer>();
 }
 
-void LatenessHistogram::add(std::int64_t lateness_ns) noexcept {
-  std::size_t bucket = 0;
-  for (std::int64_t edge = kFirstEdgeNs; lateness_ns >= edge && bucket + 1 < buckets_.size(); edge *= 2)
-    ++bucket;
-  ++buckets_[bucket];
-  ++count_;
-  worst_ns_ = std::max(worst_ns_, lateness_ns);
-}
-
-std::int64_t LatenessHistogram::percentile_ns(double share) const noexcept {
-  const auto wanted = static_cast<std::uint64_t>(share * static_cast<double>(count_));
-  std::uint64_t seen = 0;
-  std::int64_t edge = kFirstEdgeNs;
-  for (const std::uint64_t bucket : buckets_) {
-    seen += bucket;
-    if (seen > wanted) break;
-    edge *= 2;
-  }
-  return std::min(edge, worst_ns_);
-}
-
 std::vector<std::string> enter_realtime(const RealtimeConfig& config) {
   std::vector<std::string> notes;
   if (config.priority > 0) {

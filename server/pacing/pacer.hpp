@@ -1,6 +1,5 @@
 #pragma once
 
-#include <array>
 #include <cstdint>
 #include <memory>
 #include <string>
@@ -30,26 +29,6 @@ std::unique_ptr<Pacer> make_realtime_pacer(PacerKind kind, std::int64_t period_n
 
 /// A pacer that never waits.
 std::unique_ptr<Pacer> make_free_pacer();
-
-/// Counts latenesses: bucket n holds those below 125 ns times 2^n that no earlier bucket holds; the last
-/// bucket holds the rest.
-class LatenessHistogram {
- public:
-  static constexpr std::int64_t kFirstEdgeNs = 125;
-  static constexpr std::size_t kBuckets = 32;
-
-  void add(std::int64_t lateness_ns) noexcept;
-  std::uint64_t count() const noexcept { return count_; }
-  std::int64_t worst_ns() const noexcept { return worst_ns_; }
-  const std::array<std::uint64_t, kBuckets>& buckets() const noexcept { return buckets_; }
-  /// The upper edge of the bucket in which this share (0..1) of all entries is reached.
-  std::int64_t percentile_ns(double share) const noexcept;
-
- private:
-  std::array<std::uint64_t, kBuckets> buckets_{};
-  std::uint64_t count_ = 0;
-  std::int64_t worst_ns_ = 0;
-};
 
 /// Asks for real-time scheduling, CPU and locked memory for this thread. Returns a sentence for each refusal
 /// of the system.

@@ -6,7 +6,6 @@ void TickClock::wait_for_tick() noexcept {
   lateness_ns_ = pacer_->wait();
   if (!is_realtime_) return;
   lateness_.add(lateness_ns_);
-  worst_ns_.store(lateness_.worst_ns(), std::memory_order_relaxed);
   if (lateness_ns_ > max_lateness_ns_) begin_anew();  // it asks for the time, which a tick must not
   has_begun_ = std::exchange(begins_, false);
 }

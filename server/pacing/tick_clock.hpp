@@ -1,6 +1,5 @@
 #pragma once
 
-#include <atomic>
 #include <cstdint>
 #include <memory>
 #include <optional>
@@ -9,6 +8,7 @@
 #include "protocols/mcap/time_base.hpp"
 #include "server/bench/bench.hpp"
 #include "server/config/config.hpp"
+#include "server/host/octave_histogram.hpp"
 #include "server/pacing/pacer.hpp"
 
 namespace drivebench {
@@ -42,9 +42,9 @@ class TickClock {
   }
 
   /// The latenesses of all ticks so far; empty outside real time. For the tick thread only.
-  const LatenessHistogram& lateness() const noexcept { return lateness_; }
-  /// The largest lateness so far; for every thread.
-  std::int64_t worst_lateness_ns() const noexcept { return worst_ns_.load(std::memory_order_relaxed); }
+  const OctaveHistogram& lateness() const noexcept { return lateness_.own(); }
+  /// The same for every thread.
+  SharedOctaveHistogram::View shown_lateness() const noexcept { return lateness_.view(); }
 
  private:
   bool is_realtime_;
@@ -54,8 +54,7 @@ class TickClock {
   std::int64_t lateness_ns_ = 0;  ///< of the tick that is due
   bool begins_ = true;            ///< the due times begin with the next tick
   bool has_begun_ = false;        ///< they began with the tick that is due
-  LatenessHistogram lateness_;
-  std::atomic<std::int64_t> worst_ns_{0};
+  SharedOctaveHistogram lateness_;
 };
 
 }  // namespace drivebench

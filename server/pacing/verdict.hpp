@@ -4,7 +4,7 @@
 #include <string>
 
 #include "server/config/config.hpp"
-#include "server/pacing/pacer.hpp"
+#include "server/host/octave_histogram.hpp"
 
 namespace drivebench {
 
@@ -13,8 +13,8 @@ struct Verdict {
   RunMode mode = RunMode::kLockstep;
   std::uint64_t ticks = 0;
   std::uint64_t late_ticks = 0;
-  LatenessHistogram lateness{};  ///< empty outside real time
-  std::uint64_t gaps = 0;        ///< entries that the recorder lost
+  OctaveHistogram lateness{};  ///< empty outside real time
+  std::uint64_t gaps = 0;    ///< entries that the recorder lost
   std::uint64_t state_hash = 0;
   std::string recording{};  ///< its first file that is there; empty: none
   std::string remarks{};    ///< damage that disks and other programs have done to its files

@@ -221,6 +221,10 @@ def make_messages():
             pb.Command(tick=7, gates=pb.GATES_VOLTAGE, u_a_v=-80.0, u_b_v=1e300, u_c_v=-0.0, u_f_v=3.0),
             pb.Command(axis=1, gates=pb.GATES_CURRENT, i_a_a=1.0, i_b_a=-2.0, i_c_a=3.0, i_f_a=-4.0)])),
         "subscribe": pb.Envelope(id=3, subscribe=pb.Subscribe(decimation=8, signals=["i_a_a", "angle_rad"])),
+        "trigger": pb.Envelope(id=3, trigger=pb.Trigger(
+            condition=pb.TRIGGER_LEAVES, signal="i_a_a", level=-1e300, upper=2.0, bits=2**63, ticks_before=65535, ticks_after=1, hold_off_ticks=2**64 - 1,
+            single=True, captured=[pb.CapturedSignals(signals=["i_a_a", "tick"]), pb.CapturedSignals(axis=1, signals=["faults"])])),
+        "capture": pb.Envelope(id=3, read_capture=pb.ReadCapture(capture=1, first_row=7)),
         "load": pb.Envelope(id=4, set_load=pb.SetLoad(load_nm=0.1, ramp_ticks=2**64 - 1, at_tick=5)),
         "parameter": pb.Envelope(id=5, write_parameter=pb.WriteParameter(name="amplifier.gain", value=1.5)),
         "ramp": pb.Envelope(id=5, write_parameter=pb.WriteParameter(name="amplifier.gain", value=1.5, ramp_ticks=2**53)),

@@ -134,11 +134,12 @@ class Server:
 
 
 class Client:
-    """One connection. Messages without a request are kept in `samples` and `notices`."""
+    """One connection. Messages without a request are kept in `samples`, `triggered` and `notices`."""
 
     def __init__(self, sock, hello=True, token="", conducts=False):
         self.socket = sock
         self.samples = []
+        self.triggered = []
         self.notices = []
         self.last_id = 0
         self.owner = 0
@@ -188,6 +189,8 @@ class Client:
             envelope = self.receive()
             if envelope.WhichOneof("kind") == "samples":
                 self.samples.append(envelope.samples)
+            elif envelope.WhichOneof("kind") == "triggered":
+                self.triggered.append(envelope.triggered)
             elif envelope.WhichOneof("kind") == "notice":
                 self.notices.append(envelope.notice)
             elif envelope.id == number:

@@ -38,11 +38,12 @@ def samples_of(text):
             seen.add(family)
         elif line.startswith("# TYPE "):
             _, _, name, kind = line.split(" ")
-            if name != family or kind not in ("counter", "gauge") or (kind == "counter") != name.endswith("_total"):
+            if name != family or kind not in ("counter", "gauge", "histogram") or (kind == "counter") != name.endswith("_total"):
                 raise AssertionError(line)
         else:
             match = METRIC.fullmatch(line)
-            if not match or match[1] != family or kind is None or (match[1], match[2]) in found:
+            of_family = match and (match[1] == family or (kind == "histogram" and match[1] in [family + end for end in ("_bucket", "_sum", "_count")]))
+            if not of_family or kind is None or (match[1], match[2]) in found:
                 raise AssertionError(line)
             found[match[1], match[2]] = float(match[3])
     return found
@@ -283,8 +284,33 @@ class Reports(GatewayTest):
         self.assertEqual(found["drivebench_axis_owned", f'axis="{name}"'], 1)
         self.assertEqual(found["drivebench_axis_refused_commands_total", f'axis="{name}"'], 1)
         self.assertGreater(found["process_resident_memory_bytes", None], 1e6)
+        self.assertGreater(found["drivebench_resident_memory_bytes", None], 1e6)
+        self.assertEqual(self.histogram(found, "drivebench_exchange_seconds")[-1], ("+Inf", 2), "a refused exchange is none")
+        self.assertNotIn(("drivebench_tick_lateness_seconds_count", None), found, "time is not paced in lockstep")
         status, headers, body = gateway.get("/health")
         self.assertEqual((status, headers["Content-Type"], json.loads(body)["status"]), (200, "application/json", "ok"))
+
+    def histogram(self, found, name):
+        """The buckets, which must rise to the count, with a sum that they allow."""
+        buckets = [(labels.partition("=")[2].strip('"'), value) for (metric, labels), value in found.items() if metric == f"{name}_bucket"]
+        edges = [float(edge.replace("+Inf", "inf")) for edge, _ in buckets]
+        counts = [count for _, count in buckets]
+        self.assertEqual((len(buckets), edges, counts), (32, sorted(edges), sorted(counts)))
+        self.assertEqual((edges[0], edges[1], edges[-1]), (125e-9, 250e-9, float("inf")))
+        self.assertEqual(found[f"{name}_count", None], counts[-1])
+        each = [count - before for count, before in zip(counts, [0, *counts])]
+        self.assertLessEqual(sum(n * edge / 2 for n, edge in zip(each[1:-1], edges[1:-1])), found[f"{name}_sum", None])
+        if each[-1] == 0:
+            self.assertLessEqual(found[f"{name}_sum", None], sum(n * edge for n, edge in zip(each[:-1], edges[:-1])))
+        return buckets
+
+    def test_latenesses_are_a_histogram_in_real_time(self):
+        """Catches: buckets that are not cumulative, edges in other units, a tick without a bucket, a sum of other ticks."""
+        gateway = self.gateway(server=self.server("--mode", "realtime"))
+        found = samples_of(gateway.get("/metrics")[2])
+        count = self.histogram(found, "drivebench_tick_lateness_seconds")[-1][1]
+        self.assertGreaterEqual(count, found["drivebench_ticks_total", None])  # a tick counts before it runs
+        self.assertGreater(count, 0)
 
     def test_a_lost_bench_is_reported_and_found_again(self):
         """Catches: metrics of a bench that is gone, and a gateway that needs a restart."""

@@ -1,6 +1,7 @@
 """Programs that this project did not write read its recordings and speak its protocol."""
 import csv
 import json
+import os
 import pathlib
 import shutil
 import subprocess
@@ -86,6 +87,31 @@ class Recordings(unittest.TestCase):
                 self.assertEqual(float(row[field.name]), float(getattr(last, field.name)), field.name)
         self.assertIn("speed_rad_s", row)
 
+    def test_mcap_core_and_our_programs_read_the_view_of_a_scope(self):
+        """Catches: an index or a length that only the page's own reader takes, a schema that does not fit its samples, other topics, times or
+        units than those of a recording, a view that passes for a whole run."""
+        page = SERVER.parents[1] / "clients/web/page"
+        if not (page / "src/bench_messages.js").exists():
+            self.skipTest("the page is not built")
+        view = self.folder / "view.mcap"
+        made = run("node", TESTS / "web/page/view_file.mjs", view,
+                   env={**os.environ, "PAGE_SOURCES": str(page / "src"), "PAGE_PACKAGES": str(page / "node_modules")})
+        self.assertEqual(made.returncode, 0, made.stderr[-500:])
+        read = run("node", self.install_mcap_core(), view)
+        self.assertEqual(read.returncode, 0, read.stderr)
+        found = json.loads(read.stdout)
+        self.assertEqual([(each["topic"], each["messages"], each["first_log_time"], each["last_log_time"]) for each in found["channels"]],
+                         [(f"/{axis}/sample", 40_000, "125000000", "5124875000") for axis in ("one", "two")])
+        self.assertEqual(found["channels"][0]["metadata"], {"unit.tick": "1", "unit.speed_rad_s": "rad/s", "unit.faults": "bits"})
+        last = pb.Sample.FromString(bytes.fromhex(found["last"]["/one/sample"]))
+        self.assertEqual((last.tick, last.speed_rad_s, last.faults), (40_999, 40_999 / 8, 1))
+        exported = run(DRIVEBENCH, "export", view, "--axis", "two", "--signals", "encoder_count", "--out", self.folder / "two.csv")
+        self.assertEqual((exported.returncode, "it holds no verdict" in exported.stderr), (3, True), exported.stderr)
+        with open(self.folder / "two.csv", newline="", encoding="utf-8") as file:
+            self.assertEqual(list(csv.reader(file))[-1], ["40999", "5.124875000", "-40999"])
+        replayed = run(DRIVEBENCH, "replay", view)
+        self.assertNotEqual(replayed.returncode, 0)
+        self.assertIn("it has no configuration inside", replayed.stdout + replayed.stderr)
 
     def test_foreign_readers_find_the_wall_time(self):
         """Catches: metadata that @mcap/core does not find or reads otherwise, a start of the MDF file in other units, a column

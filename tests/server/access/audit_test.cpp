@@ -153,7 +153,6 @@ class ShownEngine final : public Engine {
   bool restore(std::span<const std::byte>) override { return false; }
   Verdict stop() override { return {}; }
   std::uint64_t state_hash() const override { return 0; }
-  std::int64_t worst_lateness_ns() const override { return 0; }
 
  private:
   void submit(const Input& input, Answer answer) override {

@@ -250,7 +250,7 @@ v1::ExperimentInfo largest_info(std::uint64_t id) {
   verdict.set_gaps(kMaxExperimentTicks);
   verdict.set_state_hash(1);
   verdict.set_sentence(std::string(250, 's'));
-  for (std::size_t i = 0; i < LatenessHistogram::kBuckets; ++i)
+  for (std::size_t i = 0; i < OctaveHistogram::kBuckets; ++i)
     verdict.add_lateness_counts(kMaxExperimentTicks);
   return info;
 }

@@ -131,37 +131,6 @@ TEST(FreePacer, IsNeverLate) {
   }
 }
 
-// Catches: a bucket whose edge belongs to its neighbour, percentiles off by a bucket, a worst case that is
-// rounded.
-TEST(LatenessHistogram, PercentilesAreUpperEdgesOfTheirBuckets) {
-  LatenessHistogram histogram;
-  EXPECT_EQ(histogram.percentile_ns(0.99), 0);
-  for (int n = 0; n < 90; ++n)
-    histogram.add(124);
-  for (int n = 0; n < 9; ++n)
-    histogram.add(125);
-  histogram.add(1'000'001);
-  EXPECT_EQ(histogram.count(), 100u);
-  EXPECT_EQ(histogram.worst_ns(), 1'000'001);
-  EXPECT_EQ(histogram.percentile_ns(0.0), 125);
-  EXPECT_EQ(histogram.percentile_ns(0.5), 125);
-  EXPECT_EQ(histogram.percentile_ns(0.89), 125);
-  EXPECT_EQ(histogram.percentile_ns(0.95), 250);
-  EXPECT_EQ(histogram.percentile_ns(0.98), 250);
-  EXPECT_EQ(histogram.percentile_ns(0.999), 1'000'001) << "never above the worst";
-  EXPECT_EQ(histogram.percentile_ns(1.0), 1'000'001);
-}
-
-// Catches: a lateness beyond the last bucket that is written past the end.
-TEST(LatenessHistogram, EveryLatenessHasABucket) {
-  LatenessHistogram histogram;
-  for (const std::int64_t lateness : {std::int64_t{0}, std::int64_t{1} << 50, INT64_MAX})
-    histogram.add(lateness);
-  EXPECT_EQ(histogram.count(), 3u);
-  EXPECT_EQ(histogram.worst_ns(), INT64_MAX);
-  EXPECT_EQ(histogram.percentile_ns(0.0), 125);
-}
-
 // Catches: a refusal of the operating system that no note tells of.
 TEST(EnterRealtime, OS_07_ReportsRightsThatWereNotGranted) {
   std::vector<std::string> notes;

@@ -96,6 +96,31 @@ async function catchFiles(page) {
   }, /./);
 }
 
+/** A single trigger on a fault that appears; its state. */
+async function armOnFault(page) {
+  await stateOf(page, "tick", /[1-9]/);
+  await set(page, "window", "0.5");
+  await set(page, "trigger condition", "bit");
+  await page.evaluate(() => {
+    const bits = document.querySelector('[aria-label="trigger bit"]');
+    bits.value = [...bits.options].find((each) => each.textContent.endsWith("injected open_phase")).value;
+    bits.dispatchEvent(new Event("change"));
+  });
+  await set(page, "trigger sweep", "single");
+  return text(page, '[aria-label="trigger state"]', /armed/);
+}
+
+/** The fault, half a second of the bench later, for one tick; the bench's answer. */
+async function injectForATick(page) {
+  await set(page, "fault", "open_phase");
+  await set(page, "value of the fault", "1");
+  await set(page, "ticks that the fault lasts; 0: until it is ended", "1");
+  await press(page, "Inject");
+  const answer = await text(page, "#knobs .answer", /:/);
+  if (!answer.includes("done")) throw new Error(answer);
+  return answer;
+}
+
 /** What axe-core says against the page, in both themes. */
 async function axeFinds(page) {
   const source = readFileSync(createRequire(import.meta.url).resolve("axe-core/axe.min.js"), "utf8");
@@ -198,32 +223,32 @@ const scenarios = {
 
   /** A fault of one tick, and a trigger on it. */
   async trigger(page) {
-    await stateOf(page, "tick", /[1-9]/);
-    await set(page, "window", "0.5");
-    await set(page, "trigger condition", "bit");
-    await page.evaluate(() => {
-      const bits = document.querySelector('[aria-label="trigger bit"]');
-      bits.value = [...bits.options].find((each) => each.textContent.endsWith("injected open_phase")).value;
-      bits.dispatchEvent(new Event("change"));
-    });
-    await set(page, "trigger sweep", "single");
-    const armed = await text(page, '[aria-label="trigger state"]', /armed/);
-    await set(page, "fault", "open_phase");
-    await set(page, "value of the fault", "1");
-    await set(page, "ticks that the fault lasts; 0: until it is ended", "1");
-    await press(page, "Inject");
-    const answer = await text(page, "#knobs .answer", /:/);
-    if (!answer.includes("done")) throw new Error(answer);
+    const armed = await armOnFault(page);
+    const answer = await injectForATick(page);
     const state = await text(page, '[aria-label="trigger state"]', /triggered/);
-    await page.evaluate(() => {
-      const add = document.querySelector('[aria-label="add a signal to this pane"]');
-      add.value = "0:injected";
-      add.dispatchEvent(new Event("change"));
-    });
+    await add((await page.$$(".pane"))[0], "0:injected");
     const row = await until(async () => JSON.stringify(await measured(page, "injected") ?? {}), /"maximum":"[1-9]/);
     const file = await catchFiles(page);
     await press(page, "CSV");
-    return { armed, state, answer, row: JSON.parse(row), csv: await file(/\.csv/) };
+    const csv = await file(/\.csv/);
+    await page.evaluate(() => { window.offered = {}; });
+    await press(page, "MCAP");
+    return { armed, state, answer, row: JSON.parse(row), csv, mcap: (await file(/MCAP0/)).split("\n")[0] };
+  },
+
+  /** The same while the page hears nothing for so long that it loses samples. */
+  async slowTrigger(page) {
+    await add((await page.$$(".pane"))[0], "0:injected");
+    await armOnFault(page);
+    await injectForATick(page);
+    await page.evaluate(() => {
+      for (const end = Date.now() + 15_000; Date.now() < end;);
+    });
+    const lost = await text(page, "#scope .note", /samples lost/);
+    const state = await text(page, '[aria-label="trigger state"]', /triggered/);
+    const file = await catchFiles(page);
+    await press(page, "CSV");
+    return { lost, state, csv: await file(/\.csv/) };
   },
 
   /** A band that a signal leaves for one tick, and a hold-off in which it does so again. */

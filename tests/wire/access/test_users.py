@@ -73,6 +73,7 @@ class Roles(UsersTest):
         self.assertEqual((viewer.welcome.role, viewer.welcome.subject), (pb.ROLE_VIEWER, "vera"))
         allowed = {"subscribe": pb.Subscribe(decimation=1), "read_parameters": pb.ReadParameters(),
                    "status_request": pb.StatusRequest(), "exchange": pb.Exchange(),
+                   "trigger": pb.Trigger(), "read_capture": pb.ReadCapture(),
                    "list_experiments": pb.ListExperiments(), "fetch_experiment": pb.FetchExperiment(id=1)}
         forbidden = {"lease": pb.LeaseRequest(action=1), "exchange": pb.Exchange(commands=[pb.Command()]),
                      "write_parameter": pb.WriteParameter(name="machine.rotor_resistance_ohm", value=5.0),
@@ -83,7 +84,8 @@ class Roles(UsersTest):
                      "restore_state": pb.RestoreState(), "reset_bench": pb.ResetBench(), "share_memory": pb.ShareMemory()}
         asked = {field.name for field in pb.Envelope.DESCRIPTOR.oneofs_by_name["kind"].fields} & {*allowed, *forbidden}
         answers = {"id", "hello", "welcome", "refusal", "done", "exchange_reply", "samples", "parameter_values", "status",
-                   "experiment_info", "table_info", "experiment_list", "experiment_data", "notice", "saved_state", "shared_memory"}
+                   "experiment_info", "table_info", "experiment_list", "experiment_data", "notice", "saved_state", "shared_memory", "triggered",
+                   "capture_rows"}
         every = {field.name for field in pb.Envelope.DESCRIPTOR.fields}
         self.assertEqual(every, asked | answers, "a new request needs its roles here")
         for kind, request in allowed.items():

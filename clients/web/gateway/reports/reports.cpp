@@ -1,16 +1,15 @@
 #include "clients/web/gateway/reports/reports.hpp"
 
 #include <fmt/core.h>
-#include <unistd.h>
 
 #include <cmath>
-#include <fstream>
 #include <initializer_list>
 #include <nlohmann/json.hpp>
 #include <utility>
 
 #include "clients/link/tcp/mode_name.hpp"
 #include "protocols/json.hpp"
+#include "protocols/resident_memory.hpp"
 #include "protocols/text.hpp"
 
 namespace drivebench::web {
@@ -25,13 +24,28 @@ class Exposition {
     name_ = name;
     text_ += fmt::format("# HELP {} {}\n# TYPE {} {}\n", name, help, name, type);
   }
-  void value(double value, Labels labels = {}) { line(number(value), labels); }
-  void value(std::uint64_t value, Labels labels = {}) { line(fmt::format("{}", value), labels); }
+  void value(double value, Labels labels = {}) { line("", number(value), labels); }
+  void value(std::uint64_t value, Labels labels = {}) { line("", fmt::format("{}", value), labels); }
 
   template <class Value>
   void single(std::string_view name, std::string_view type, std::string_view help, Value only) {
     family(name, type, help);
     value(only);
+  }
+
+  /// Counts of times as Status has them: entry n below 125 ns times 2^n and in no earlier one.
+  void histogram(std::string_view name, std::string_view help,
+                 const google::protobuf::RepeatedField<std::uint64_t>& counts, double sum_s) {
+    family(name, "histogram", help);
+    std::uint64_t below = 0;
+    double edge_s = kFirstEdgeS;
+    for (int n = 0; n < counts.size(); ++n, edge_s *= 2.0) {
+      below += counts[n];
+      const bool is_last = n + 1 == counts.size();
+      line("_bucket", fmt::format("{}", below), {{"le", is_last ? "+Inf" : number(edge_s)}});
+    }
+    line("_sum", number(sum_s), {});
+    line("_count", fmt::format("{}", below), {});
   }
 
   std::string take() { return std::move(text_); }
@@ -54,8 +68,9 @@ class Exposition {
     }
     return out;
   }
-  void line(const std::string& value, Labels labels) {
+  void line(std::string_view suffix, const std::string& value, Labels labels) {
     text_ += name_;
+    text_ += suffix;
     char separator = '{';
     for (const auto& [label, of] : labels) {
       text_ += fmt::format("{}{}=\"{}\"", separator, label, escaped(of));
@@ -65,20 +80,14 @@ class Exposition {
     text_ += ' ' + value + '\n';
   }
 
+  static constexpr double kFirstEdgeS = 125e-9;
+
   std::string text_;
   std::string name_;
 };
 
 constexpr std::string_view kCounter = "counter";
 constexpr std::string_view kGauge = "gauge";
-
-std::uint64_t resident_bytes() {
-  std::ifstream file("/proc/self/statm");
-  std::uint64_t total = 0;
-  std::uint64_t resident = 0;
-  file >> total >> resident;
-  return resident * static_cast<std::uint64_t>(::sysconf(_SC_PAGESIZE));
-}
 
 void add_gateway(Exposition& out, const GatewayCounts& counts) {
   out.single("drivebench_web_connections", kGauge, "Connections to the gateway that are open.",
@@ -108,6 +117,16 @@ void add_bench(Exposition& out, const Reading& reading) {
              status.late_ticks());
   out.single("drivebench_worst_lateness_seconds", kGauge, "The worst lateness of a tick.",
              status.worst_lateness_s());
+  if (!status.lateness_counts().empty()) {
+    out.histogram("drivebench_tick_lateness_seconds", "Time from when a tick was due to its start.",
+                  status.lateness_counts(), status.lateness_sum_s());
+  }
+  out.histogram(
+      "drivebench_exchange_seconds",
+      "Time in the server from the arrival of commands to the answer with the samples of their tick.",
+      status.exchange_counts(), status.exchange_sum_s());
+  out.single("drivebench_resident_memory_bytes", kGauge, "Resident memory of the server.",
+             status.resident_bytes());
   out.single("drivebench_sessions", kGauge, "Sessions of the server, with that of the gateway.",
              std::uint64_t{status.sessions()});
   out.single("drivebench_recording", kGauge, "1: the server writes a recording.",

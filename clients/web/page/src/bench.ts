@@ -1,6 +1,5 @@
 /** What the page knows of the bench. */
 import { History, Rows } from "./history";
-import { hasBit } from "./trigger";
 import { pb, Wire } from "./wire";
 
 /** Samples of an axis, of which those up to the last tick are shown. */
@@ -17,6 +16,8 @@ export interface Source {
   /** The time between two samples. [s] */
   readonly sampleS: number;
   readonly dropped: number;
+  /** Of the bench. */
+  readonly wire?: Wire;
 }
 
 /** The states of an axis, as samples number them. */
@@ -52,6 +53,10 @@ export class Bench implements Source {
     return !this.conducts && this.description.mode !== pb.Mode.MODE_FREE;
   }
 
+  get isRealtime(): boolean {
+    return this.description.mode === pb.Mode.MODE_REALTIME;
+  }
+
   get isLockstep(): boolean {
     return this.description.mode === pb.Mode.MODE_LOCKSTEP;
   }
@@ -63,6 +68,11 @@ export class Bench implements Source {
   sampleOf(axis: number): pb.Sample | null {
     return (this.status?.axes.find((each) => each.axis === axis)?.sample ?? null) as pb.Sample | null;
   }
+}
+
+/** Whether a bit is set in a number of up to 53 bits. */
+export function hasBit(word: number, bit: number): boolean {
+  return Math.floor(word / bit) % 2 === 1;
 }
 
 /** The names of the bits that are set. */

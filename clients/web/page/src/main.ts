@@ -32,6 +32,7 @@ class Page {
     this.wire = new Wire({
       welcome: (welcome, conducts) => this.welcome(welcome, conducts),
       samples: (samples) => this.take(samples),
+      triggered: (triggered) => this.scope?.triggered(triggered),
       notice: (notice) => this.alert(notice),
       drive: (report) => this.drive?.take(report),
       tokenWanted: (sentence) => this.wantToken(sentence),
@@ -95,9 +96,9 @@ class Page {
     this.bench!.dropped += lost;
     for (const sample of samples.samples) {
       history.push(sample as unknown as Record<string, number>, lost > 0);
-      this.scope?.see(axis, sample as unknown as Record<string, number>);
       lost = 0;
     }
+    this.scope?.see();
   }
 
   private async askStatus(): Promise<void> {

@@ -1,12 +1,15 @@
 /** The scope: panes, time base, trigger, cursors and measurements. */
 import { signalOf, Source } from "./bench";
+import { Captured, withCapture } from "./capture";
 import { button, choice, element, SavedFile, saveButton, setText } from "./dom";
 import { csvOf, kColumns, svgOf } from "./exports";
+import { mcapOf } from "./mcap_export";
 import { MeasurementTable } from "./measurement_table";
 import { Pane } from "./pane";
 import { Trigger } from "./trigger";
 import { TriggerBar } from "./trigger_bar";
 import { betweenCursors, frozen, part, rollingView, View, viewOf } from "./view";
+import { pb } from "./wire";
 
 const kWindows_s = [0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1, 2, 5, 10, 30];
 const kFrameMs = 15;
@@ -20,7 +23,7 @@ export class Scope {
   private readonly panes: Pane[] = [];
   private readonly place = element("div", { class: "panes", tabindex: 0, role: "group",
     "aria-label": "Plots. Space pauses; a and b choose a cursor, the arrows move it, Escape removes cursors and zoom." });
-  private readonly trigger = new Trigger();
+  private readonly trigger: Trigger;
   private readonly bar: TriggerBar;
   private readonly table: MeasurementTable;
   private readonly pauseButton = button("Pause", () => this.togglePause());
@@ -42,6 +45,7 @@ export class Scope {
   /** `subscribe` is called when other signals are needed. */
   constructor(root: HTMLElement, private readonly source: Source, panes: string[][], private readonly subscribe: () => void,
     private readonly played?: { lengthS: number; axis: number; togglePause(): void }) {
+    this.trigger = new Trigger(source.wire, () => { this.isDirty = true; });
     this.bar = new TriggerBar(source, this.trigger, () => this.arm());
     this.table = new MeasurementTable(source);
     const windows = kWindows_s.filter((each) => played === undefined || each < played.lengthS)
@@ -53,7 +57,7 @@ export class Scope {
     this.time = choice(played === undefined ? "window" : "window of the player", windows, (value) => this.setWindow(Number(value)));
     this.time.value = String(this.windowS);
     root.replaceChildren(element("div", { class: "bar" }, "Window", this.time, ...(played === undefined ? [this.pauseButton] : []),
-      button("Add pane", () => this.addPane([])), saveButton("CSV", () => this.csv()), saveButton("SVG", () => this.svg()),
+      button("Add pane", () => this.addPane([])), saveButton("CSV", () => this.csv()), saveButton("SVG", () => this.svg()), saveButton("MCAP", () => this.mcap()),
       this.note), ...(played === undefined ? [this.bar.root] : []), this.place, this.table.root);
     for (const signals of panes) this.addPane(signals, played?.axis);
     this.place.addEventListener("keydown", (event) => this.key(event));
@@ -81,9 +85,13 @@ export class Scope {
     this.isDirty = true;
   }
 
-  see(axis: number, sample: Record<string, number>): void {
-    this.trigger.see(axis, sample);
+  /** New samples have come. */
+  see(): void {
     this.isDirty ||= this.held === null || this.trigger.isArmed;
+  }
+
+  triggered(triggered: pb.Triggered): void {
+    this.trigger.take(triggered);
   }
 
   /** Draws in the colours of another theme. */
@@ -120,17 +128,24 @@ export class Scope {
     this.isDirty = true;
     this.nextTable = 0;
     this.subscribe();
+    if (this.trigger.isArmed) this.armTrigger();
   }
 
   private setWindow(windowS: number): void {
     this.windowS = windowS;
     this.zoom = null;
     if (!this.isPaused) this.held = null;
+    if (this.trigger.isArmed) this.armTrigger();
     this.isDirty = true;
   }
 
+  private armTrigger(): void {
+    this.trigger.arm(this.panes.flatMap((pane) => pane.channels).filter((each, i, all) =>
+      all.findIndex(({ axis, signal }) => axis === each.axis && signal === each.signal) === i), this.windowTicks);
+  }
+
   private arm(): void {
-    this.trigger.arm();
+    this.armTrigger();
     this.held = null;
     this.zoom = null;
     this.isPaused = false;
@@ -146,10 +161,11 @@ export class Scope {
     setText(this.pauseButton, this.isPaused ? "Run" : "Pause");
     if (this.isPaused) {
       this.held ??= frozen(rollingView(this.source, this.windowTicks));
+      this.trigger.end();
     } else {
       this.held = null;
       this.zoom = null;
-      this.trigger.arm();
+      this.armTrigger();
     }
     this.isDirty = true;
   }
@@ -182,28 +198,32 @@ export class Scope {
     return this.zoom === null ? view : part(view, ...this.zoom);
   }
 
-  /** Holds the window of a trigger once its last sample has come. */
+  /** Shows the window of an event as it fills, and then as the server has kept it. */
   private sweep(): void {
-    const { settings, firedTick } = this.trigger;
+    const { settings, firedTick, captured, problem } = this.trigger;
     if (settings.condition === "off" || this.isPaused) {
       this.bar.show(settings.condition === "off" ? "off" : "paused");
-      return;
-    }
-    if (!this.trigger.isArmed) return;
-    if (firedTick === null) {
-      this.bar.show(this.trigger.holdsOff ? "hold-off" : "armed");
+    } else if (problem !== "") {
+      this.bar.show(problem);
+    } else if (captured !== null) {
+      this.trigger.captured = null;
+      this.hold(captured.tick, captured);
+    } else if (firedTick !== null) {
+      this.hold(firedTick, null);
+    } else if (this.trigger.isArmed) {
+      this.bar.show(this.trigger.holdsOff(this.source.histories[settings.axis].lastTick) ? "hold-off" : "armed");
       if (settings.sweep === "auto" && performance.now() - this.autoShown > kAutoMs) this.held = null;
       else if (this.held === null && settings.sweep !== "auto") this.held = frozen(viewOf(this.source, 0, -1, 0));
-      return;
     }
-    const from = firedTick - settings.before * this.windowTicks;
-    const to = from + this.windowTicks;
-    this.held = frozen(viewOf(this.source, from, to, firedTick));
+  }
+
+  private hold(tick: number, captured: Captured | null): void {
+    const from = tick - this.trigger.settings.before * this.windowTicks;
+    const view = viewOf(this.source, from, from + this.windowTicks, tick);
+    this.held = captured === null ? frozen(view) : withCapture(frozen(view), captured);
     this.autoShown = performance.now();
-    this.bar.show(`triggered at tick ${firedTick}`);
-    if (this.source.histories[settings.axis].lastTick < to) return;
-    if (settings.sweep === "single") this.trigger.isArmed = false;
-    else this.trigger.armAgain();
+    this.bar.show(`triggered at tick ${tick}`);
+    this.bar.showLoss(this.trigger.missedEvents, this.trigger.lostTicks);
   }
 
   private ticksAt(time: number): number {
@@ -247,6 +267,13 @@ export class Scope {
       ...each, title: `${pane.nameOf(each)} [${signalOf(this.source, each.signal).unit}]` })));
     const view = this.played === undefined ? frozen(this.view()) : this.view(); // the bench goes on
     return { name: `${this.source.description.name}.csv`, type: "text/csv", content: () => csvOf(channels, view, this.periodS) };
+  }
+
+  private mcap(): SavedFile {
+    const channels = this.panes.flatMap((pane) => pane.channels);
+    const view = this.played === undefined ? frozen(this.view()) : this.view();
+    return { name: `${this.source.description.name}.mcap`, type: "application/octet-stream",
+      content: () => mcapOf(this.source, channels, view) };
   }
 
   private svg(): SavedFile {

@@ -3,6 +3,7 @@ import { Bench, kStates, namesOfBits } from "./bench";
 import { element } from "./dom";
 import { DriveTrain } from "./drive_train";
 import { Facts } from "./facts";
+import { Latenesses } from "./latenesses";
 import { plain, withUnit } from "./numbers";
 import { Transports } from "./transports";
 import { verdictOf } from "./verdict";
@@ -18,11 +19,12 @@ export class StatePanel {
   private ended = false;
   private readonly notes = element("ul", { class: "notes" });
   private readonly transports = new Transports();
+  private readonly latenesses = new Latenesses();
 
   constructor(root: HTMLElement, private readonly of: Bench, private readonly ownerOf: (axis: number) => number) {
     this.axes = of.description.axes.map(() => new Facts());
     this.trains = of.description.axes.map((axis) => new DriveTrain(axis));
-    root.replaceChildren(element("h2", {}, "Bench"), this.bench.root, this.transports.root, this.notes, ...this.axes.flatMap((facts, axis) => {
+    root.replaceChildren(element("h2", {}, "Bench"), this.bench.root, ...(of.isRealtime ? [this.latenesses.root] : []), this.transports.root, this.notes, ...this.axes.flatMap((facts, axis) => {
       const { name, machine, machine_kind: kind } = of.description.axes[axis];
       return [element("h2", {}, `Axis ${axis}: ${name}`), element("p", { class: "soft" }, `${machine}, ${kind}`), this.trains[axis].root, facts.root];
     }));
@@ -41,12 +43,14 @@ export class StatePanel {
     if (status.mode === pb.Mode.MODE_REALTIME) {
       const late = status.late_ticks as number;
       this.bench.set("late ticks", late === 0 ? "none" : `${late}, worst ${withUnit(status.worst_lateness_s as number, "s")}`, late > 0 ? "warn" : "");
+      this.latenesses.draw(status.lateness_counts as number[], this.of.description.period_s as number);
     }
     const verdict = verdictOf(status);
     this.bench.set("verdict", verdict.text, verdict.isGood ? "" : "warn");
     const hash = status.state_hash as number | bigint;
     if (this.of.isLockstep) this.bench.set("state hash", hash.toString(16).padStart(16, "0"), "mono");
     this.bench.set("sessions", String(status.sessions));
+    this.bench.set("memory", `${((status.resident_bytes as number) / 2 ** 20).toFixed(0)} MiB`);
     this.bench.set("recording", recordingText(status), (status.recording_gaps as number) > 0 ? "warn" : "");
     this.transports.draw(status.transports);
     this.showNotes(status);

@@ -1,4 +1,10 @@
-/** The trigger of the scope. It sees every sample of its axis, whatever the rate at which the page draws. */
+/**
+ * The trigger of the scope. The server looks at every sample and keeps those around an event until they are fetched, so that
+ * no event is missed, whatever the browser, the gateway and the network do meanwhile.
+ */
+import { Captured, Piece, capturedRows } from "./capture";
+import { Channel } from "./view";
+import { pb, Refused, Wire } from "./wire";
 
 export type Condition = "off" | "rising" | "falling" | "above" | "below" | "leaves" | "enters" | "bit" | "state";
 export type Sweep = "auto" | "normal" | "single";
@@ -18,74 +24,125 @@ export interface TriggerSettings {
   holdOffTicks: number;
 }
 
+const kConditions = { ...conditions("RISING", "FALLING", "ABOVE", "BELOW", "LEAVES", "ENTERS"), bit: pb.TriggerCondition.TRIGGER_BITS_APPEAR,
+  state: pb.TriggerCondition.TRIGGER_EQUALS } as Record<Condition, pb.TriggerCondition>;
+/** The bounds of a capture in bench.proto: ticks, and numbers in all. */
+const kMostTicks = 65536;
+const kMostNumbers = 1 << 20;
+/** Requests for pieces that are under way; more would fill the gateway's queue. */
+const kPiecesAtOnce = 8;
+
 export class Trigger {
   settings: TriggerSettings = { condition: "off", axis: 0, signal: "", level: 0, upper: 0, before: 0.2, sweep: "normal", holdOffTicks: 0 };
-  /** The tick that fired; null: none yet. */
-  firedTick: number | null = null;
   isArmed = false;
-  private previous = NaN;
-  private lastTick = -Infinity;
-  private quietUntil = -Infinity;
+  /** The tick of an event whose capture is not fetched yet. */
+  firedTick: number | null = null;
+  /** The newest capture that is fetched; the scope takes it from here. */
+  captured: Captured | null = null;
+  /** The server's words for settings that it refused. */
+  problem = "";
+  /** What the server has told of the newest event. */
+  missedEvents = 0;
+  lostTicks = 0;
+  private channels: Channel[] = [];
+  private unanswered = 0; // requests that set the trigger; what comes before the last answer is of another setting
+  private lastFired = Infinity;
 
-  /** From now on, whatever fired before. */
-  arm(): void {
-    this.isArmed = this.settings.condition !== "off";
+  /** `changed` is called when there is something to show. */
+  constructor(private readonly wire: Pick<Wire, "ask"> | undefined, private readonly changed: () => void) {}
+
+  /** From now on, whatever fired before. The capture has the channels and the signal of the trigger. */
+  arm(shown: Channel[], windowTicks: number): void {
+    const { condition, axis, signal, level, upper, before, sweep, holdOffTicks } = this.settings;
+    if (condition === "off") return this.end();
+    const isKept = shown.some((each) => each.axis === axis && each.signal === signal);
+    this.channels = isKept ? shown : [...shown, { axis, signal }];
+    const isBit = condition === "bit";
+    this.set(true, {
+      condition: kConditions[condition], axis, signal, level: isBit ? 0 : level, upper, bits: isBit ? level : 0,
+      ...ticksAround(before, windowTicks, this.channels.length), hold_off_ticks: holdOffTicks, single: sweep === "single", captured: grouped(this.channels),
+    });
+  }
+
+  /** Nothing fires until it is armed again. */
+  end(): void {
+    if (this.isArmed) this.set(false, {});
+  }
+
+  /** It is armed, and the hold-off of the trigger before is not over at this tick. */
+  holdsOff(tick: number): boolean {
+    return tick >= this.lastFired && tick + 1 < this.lastFired + this.settings.holdOffTicks;
+  }
+
+  /** An event, and later that its capture is complete. */
+  take(triggered: pb.Triggered): void {
+    if (!this.isArmed || this.unanswered > 0) return;
+    this.firedTick = this.lastFired = triggered.tick as number;
+    this.missedEvents = triggered.missed_events as number;
+    this.lostTicks = triggered.lost_ticks as number;
+    if (triggered.complete) void this.fetch(triggered.capture as number, triggered.tick as number, triggered.rows as number);
+    this.changed();
+  }
+
+  private set(isArmed: boolean, trigger: pb.ITrigger): void {
+    this.isArmed = isArmed;
+    this.firedTick = this.captured = null;
+    this.problem = "";
+    this.lastFired = Infinity;
+    ++this.unanswered;
+    const answered = () => --this.unanswered < 0;
+    this.wire?.ask({ trigger }, answered).catch((problem) => {
+      answered();
+      if (!(problem instanceof Refused) || this.unanswered > 0) return; // a lost connection is told elsewhere
+      this.isArmed = false;
+      this.problem = problem.message;
+      this.changed();
+    });
+  }
+
+  /** All pieces of a capture; the last one arms a trigger that is not single. */
+  private async fetch(capture: number, tick: number, rows: number): Promise<void> {
+    const { channels } = this;
+    const data = new Float64Array(rows * (1 + channels.length));
+    const piece = async (first: number) => {
+      const answer = await this.wire!.ask({ read_capture: { capture, first_row: first } });
+      return put(data, channels.length, answer.capture_rows as Piece);
+    };
+    try {
+      const perPiece = await piece(0);
+      for (let first = perPiece; first < rows; first += kPiecesAtOnce * perPiece) {
+        await Promise.all(Array.from({ length: kPiecesAtOnce }, (_, n) => first + n * perPiece).filter((each) => each < rows).map(piece));
+      }
+    } catch {
+      return; // another setting has taken its place, or the connection is lost
+    }
+    if (channels !== this.channels || this.firedTick !== tick) return;
     this.firedTick = null;
-    this.previous = NaN;
-    this.quietUntil = -Infinity;
-  }
-
-  /** For the next trigger of a sweep, after the hold-off. */
-  armAgain(): void {
-    const quietUntil = this.firedTick === null ? -Infinity : this.firedTick + this.settings.holdOffTicks;
-    this.arm();
-    this.quietUntil = quietUntil;
-  }
-
-  /** It is armed, and the hold-off of the trigger before is not over. */
-  get holdsOff(): boolean {
-    return this.lastTick + 1 < this.quietUntil;
-  }
-
-  see(axis: number, sample: Record<string, number>): void {
-    const { axis: own, signal } = this.settings;
-    if (!this.isArmed || this.firedTick !== null || axis !== own) return;
-    if (sample.tick < this.lastTick) this.arm(); // another run of the bench
-    const value = sample[signal];
-    const previous = this.previous;
-    this.previous = value;
-    this.lastTick = sample.tick;
-    if (sample.tick >= this.quietUntil && fires(this.settings, previous, value)) this.firedTick = sample.tick;
+    this.isArmed = this.settings.sweep !== "single";
+    this.captured = { tick, rows: capturedRows(data, channels) };
+    this.changed();
   }
 }
 
-/** An edge, the end of a band and a state need a sample on the other side first; what lies above or below fires at once. */
-export function fires({ condition, level, upper }: Pick<TriggerSettings, "condition" | "level" | "upper">, previous: number, value: number): boolean {
-  const isInside = (each: number) => each >= level && each <= upper;
-  const isOutside = (each: number) => each < level || each > upper;
-  switch (condition) {
-    case "rising":
-      return previous < level && value >= level;
-    case "falling":
-      return previous > level && value <= level;
-    case "above":
-      return value > level;
-    case "below":
-      return value < level;
-    case "leaves":
-      return isInside(previous) && isOutside(value);
-    case "enters":
-      return isOutside(previous) && isInside(value);
-    case "bit":
-      return !Number.isNaN(previous) && !hasBit(previous, level) && hasBit(value, level);
-    case "state":
-      return !Number.isNaN(previous) && previous !== level && value === level;
-    default:
-      return false;
-  }
+function conditions(...names: string[]): object {
+  return Object.fromEntries(names.map((each) => [each.toLowerCase(), pb.TriggerCondition[`TRIGGER_${each}` as keyof typeof pb.TriggerCondition]]));
 }
 
-/** Whether a bit is set in a number of up to 53 bits. */
-export function hasBit(word: number, bit: number): boolean {
-  return Math.floor(word / bit) % 2 === 1;
+/** The ticks of a capture: those of the window, or the largest part of it that the server keeps. */
+export function ticksAround(before: number, windowTicks: number, channels: number): { ticks_before: number; ticks_after: number } {
+  const ticks = Math.min(Math.ceil(windowTicks) + 1, kMostTicks, Math.floor(kMostNumbers / (1 + channels)));
+  const ticksBefore = Math.min(Math.floor(before * ticks), ticks - 1);
+  return { ticks_before: ticksBefore, ticks_after: ticks - ticksBefore };
+}
+
+function grouped(channels: Channel[]): pb.ICapturedSignals[] {
+  const axes = [...new Set(channels.map((each) => each.axis))];
+  return axes.map((axis) => ({ axis, signals: channels.filter((each) => each.axis === axis).map((each) => each.signal) }));
+}
+
+/** Copies the rows of a piece to their place; returns their number. */
+function put(data: Float64Array, channels: number, { first_row: first, data: bytes }: Piece): number {
+  const rowBytes = 8 * (1 + channels);
+  new Uint8Array(data.buffer).set(bytes, first * rowBytes);
+  return bytes.length / rowBytes;
 }

@@ -22,6 +22,7 @@ export class TriggerBar {
   private readonly holdOffUnit = choice("unit of the hold-off", [["s", "s"], ["ticks", "ticks"]], () => this.apply());
   private readonly holdOffPlace = element("span", { class: "bar" }, "hold-off", this.holdOff, this.holdOffUnit);
   private readonly state = element("output", { "aria-label": "trigger state" }, "off");
+  private readonly loss = element("span", { class: "note" });
   private readonly arm = button("Arm", () => this.changed(), { disabled: true });
   private readonly periodS: number;
   private condition: Condition = "off";
@@ -46,7 +47,7 @@ export class TriggerBar {
       [["normal", "normal"], ["single", "single"], ["auto", "auto"]], (value) => {
         this.sweep = value as Sweep;
         this.apply();
-      }), this.holdOffPlace, this.arm, this.state);
+      }), this.holdOffPlace, this.arm, this.state, this.loss);
     this.showParts();
   }
 
@@ -58,6 +59,12 @@ export class TriggerBar {
 
   show(text: string): void {
     setText(this.state, text);
+  }
+
+  /** Events of which nothing was kept, and ticks that the trigger did not see. */
+  showLoss(events: number, ticks: number): void {
+    setText(this.loss, [events > 0 ? `${events} events before it while the last ones were fetched` : "",
+      ticks > 0 ? `${ticks} ticks unseen: the server was too busy` : ""].filter((each) => each !== "").join("; "));
   }
 
   private field(label: string, size: number): HTMLInputElement {

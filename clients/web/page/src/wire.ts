@@ -48,6 +48,7 @@ export interface Listener {
   /** `conducts`: the session may change axes that other sessions hold. */
   welcome(welcome: pb.Welcome, conducts: boolean): void;
   samples(samples: pb.Samples): void;
+  triggered(triggered: pb.Triggered): void;
   notice(notice: pb.Notice): void;
   drive(report: DriveReport): void;
   /** The bench turned the page away: it wants another token. */
@@ -160,6 +161,7 @@ export class Wire {
 
   private dispatch(envelope: pb.Envelope): void {
     if (envelope.samples) return this.listener.samples(envelope.samples as pb.Samples);
+    if (envelope.triggered) return this.listener.triggered(envelope.triggered as pb.Triggered);
     if (envelope.notice) return this.listener.notice(envelope.notice as pb.Notice);
     const waiting = this.waiting.get(envelope.id as number);
     if (!envelope.refusal && waiting?.goesOn(envelope)) return;

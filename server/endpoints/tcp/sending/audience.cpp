@@ -28,6 +28,14 @@ void Audience::remove_waiting(const Waiter& waiter) {
   std::erase(waiting_, &waiter);
 }
 
+void Audience::add_watcher(Watcher& watcher) {
+  add_once(watchers_, watcher);
+}
+
+void Audience::remove_watcher(const Watcher& watcher) {
+  std::erase(watchers_, &watcher);
+}
+
 std::shared_ptr<const SampleFeed> Audience::feed(std::uint32_t axis, std::uint32_t decimation) {
   drop_unread_feeds();
   for (const auto& feed : feeds_) {
@@ -47,12 +55,16 @@ void Audience::drop_unread_feeds() {
 void Audience::on_set_back() {
   for (const auto& feed : feeds_)
     feed->begin_anew(engine_.newest(feed->axis()));
+  for (Watcher* const watcher : watchers_)
+    watcher->on_set_back();
 }
 
 void Audience::on_tick() {
   drop_unread_feeds();
   for (const auto& feed : feeds_)
     feed->take(engine_.newest(feed->axis()));
+  for (Watcher* const watcher : watchers_)
+    watcher->on_tick();
   if (++ticks_behind_ % kTicksBehind == 0) send_all();
 }
 

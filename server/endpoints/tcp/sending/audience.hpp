@@ -36,6 +36,18 @@ class Audience {
     ~Waiter() = default;
   };
 
+  /// The part of a session that looks at every sample.
+  class Watcher {
+   public:
+    /// Called after each tick whose samples have reached the I/O thread.
+    virtual void on_tick() = 0;
+    /// Called when the bench has gone to another state.
+    virtual void on_set_back() = 0;
+
+   protected:
+    ~Watcher() = default;
+  };
+
   Audience(asio::io_context& io, Engine& engine) : engine_(engine), next_turn_(io) {}
 
   /// Serves the viewer until remove_subscriber().
@@ -44,6 +56,9 @@ class Audience {
   /// Keeps the session until the next on_newest() or remove_waiting().
   void add_waiting(Waiter& waiter);
   void remove_waiting(const Waiter& waiter);
+  /// Calls the watcher until remove_watcher(), which it must not call from there.
+  void add_watcher(Watcher& watcher);
+  void remove_watcher(const Watcher& watcher);
   /// The most feeds of every n-th sample, n above 1, that all subscriptions together have: a feed takes 0.1
   /// MB.
   static constexpr std::size_t kMostDecimatedFeeds = 128;
@@ -71,6 +86,7 @@ class Audience {
   Engine& engine_;
   std::vector<std::shared_ptr<SampleFeed>> feeds_;
   std::vector<Viewer*> subscribers_;
+  std::vector<Watcher*> watchers_;
   std::vector<Waiter*> waiting_;
   std::vector<Waiter*> answered_;  // the sessions that on_newest() is answering
   std::size_t ticks_behind_ = 0;   // since on_newest()

@@ -13,6 +13,7 @@
 #include "server/access/allowance.hpp"
 #include "server/access/audit.hpp"
 #include "server/access/places.hpp"
+#include "server/endpoints/tcp/capture/capture.hpp"
 #include "server/endpoints/tcp/sending/audience.hpp"
 #include "server/endpoints/tcp/sending/outbox.hpp"
 #include "server/endpoints/tcp/sending/spinner.hpp"
@@ -20,6 +21,7 @@
 #include "server/endpoints/transport_report.hpp"
 #include "server/engine/engine.hpp"
 #include "server/experiments/experiments.hpp"
+#include "server/host/octave_histogram.hpp"
 
 namespace drivebench {
 
@@ -45,6 +47,8 @@ struct SessionContext {
     std::uint64_t throttled = 0;        ///< pauses in serving a session
     std::uint64_t cut = 0;              ///< sessions whose peer read nothing or was silent
   } counts{};
+  OctaveHistogram exchange_times{};  ///< from the arrival of commands to the answer with their samples
+  CapturePool captures{};
   std::shared_ptr<OutboxPool> outboxes = std::make_shared<OutboxPool>();
   v1::Envelope reply{};              ///< the message that a session is writing
   std::vector<std::byte> scratch{};  ///< its bytes

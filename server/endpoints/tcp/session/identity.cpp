@@ -12,6 +12,8 @@ Role role_needed_for(const v1::Envelope& request) {
   switch (request.kind_case()) {
     case v1::Envelope::kHello:
     case v1::Envelope::kSubscribe:
+    case v1::Envelope::kTrigger:
+    case v1::Envelope::kReadCapture:
     case v1::Envelope::kReadParameters:
     case v1::Envelope::kStatusRequest:
     case v1::Envelope::kListExperiments:

@@ -12,6 +12,7 @@
 #include "protocols/signals/catalogue.hpp"
 #include "protocols/signals/command.hpp"
 #include "server/config/config.hpp"
+#include "server/endpoints/tcp/capture/capture.hpp"
 #include "server/experiments/plan.hpp"
 
 namespace drivebench {
@@ -31,6 +32,7 @@ constexpr auto kRequestKinds = std::to_array<v1::Envelope::KindCase>({
     v1::Envelope::kFetchExperiment, v1::Envelope::kCancelExperiment,
     v1::Envelope::kSaveState,       v1::Envelope::kRestoreState,
     v1::Envelope::kResetBench,      v1::Envelope::kShareMemory,
+    v1::Envelope::kTrigger,         v1::Envelope::kReadCapture,
 });
 
 /// The repeated fields of all requests.
@@ -47,6 +49,8 @@ constexpr auto kBounds = std::to_array<Bound>({
     {"exchange", "commands.edges_b", kMaxEdges},
     {"exchange", "commands.edges_c", kMaxEdges},
     {"subscribe", "signals", kSignals.size()},
+    {"trigger", "captured", kMaxAxes},
+    {"trigger", "captured.signals", CaptureSettings::kMaxChannels},
     {"read_parameters", "names", kMaxNames},
     {"run_experiment", "signals", kSignals.size()},
     {"run_experiment", "settings", kMaxPlannedEvents},

@@ -32,6 +32,7 @@ Session::Session(Outbox::Socket socket, Client client, SessionContext& context, 
     : dialogue_(std::move(socket), std::move(client), context, [this] { return shared_from_this(); }),
       identity_(dialogue_),
       subscriptions_(dialogue_),
+      trigger_(dialogue_),
       leases_(dialogue_),
       exchanges_(dialogue_, leases_, subscriptions_),
       shared_exchanges_(dialogue_, exchanges_),
@@ -168,6 +169,12 @@ bool Session::dispatch(const v1::Envelope& request) {
     case v1::Envelope::kSubscribe:
       subscriptions_.subscribe(request.subscribe());
       break;
+    case v1::Envelope::kTrigger:
+      trigger_.set(request.trigger());
+      break;
+    case v1::Envelope::kReadCapture:
+      trigger_.read(request.read_capture());
+      break;
     case v1::Envelope::kReadParameters:
       report_parameters(dialogue_, request.read_parameters());
       break;
@@ -291,6 +298,7 @@ void Session::close() {
   Audience& audience = dialogue_.context().audience;
   audience.remove_subscriber(subscriptions_);
   audience.remove_waiting(exchanges_);
+  trigger_.end();
   identity_.stop_watching();
   silence_.call_off();
   dialogue_.context().places.leave(place_);

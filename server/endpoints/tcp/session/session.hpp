@@ -14,6 +14,7 @@
 #include "server/endpoints/tcp/session/requests/exchanges.hpp"
 #include "server/endpoints/tcp/session/requests/fetch.hpp"
 #include "server/endpoints/tcp/session/requests/leases.hpp"
+#include "server/endpoints/tcp/session/requests/scope_trigger.hpp"
 #include "server/endpoints/tcp/session/requests/states.hpp"
 #include "server/endpoints/tcp/session/requests/subscriptions.hpp"
 #include "server/endpoints/tcp/session/requests/uploads.hpp"
@@ -70,6 +71,7 @@ class Session : public std::enable_shared_from_this<Session> {
   Dialogue dialogue_;
   Identity identity_;
   Subscriptions subscriptions_;
+  ScopeTrigger trigger_;
   Leases leases_;
   Exchanges exchanges_;
   SharedExchanges shared_exchanges_;

@@ -37,7 +37,6 @@ class SlowEngine final : public Engine {
   bool restore(std::span<const std::byte>) override { return false; }
   drivebench::Verdict stop() override { return {}; }
   std::uint64_t state_hash() const override { return 0; }
-  std::int64_t worst_lateness_ns() const override { return 0; }
 
  private:
   std::vector<Answer> answers_;

@@ -90,6 +90,7 @@ export function fetchExperiment(id: number, owner: string, recording: boolean, l
     const wire = new Wire({
       welcome: begin,
       samples: () => undefined,
+      triggered: () => undefined,
       notice: () => undefined,
       drive: () => undefined,
       tokenWanted: (sentence) => done(() => reject(new Error(sentence))),

@@ -57,9 +57,10 @@ void Exchanges::exchange(std::span<const shm::CommandRecord> commands, Way& way,
     std::iota(axes_.begin(), axes_.end(), 0u);
     return answer(way, id);
   }
+  const ServerClock::time_point arrived = ServerClock::now();
   if (!read(commands, way, id) || !are_taken(way, id)) return;
   add_shared();
-  waiting_ = Waiting{.way = &way, .id = id};
+  waiting_ = Waiting{.way = &way, .id = id, .since = arrived};
   dialogue_.context().audience.add_waiting(*this);
   engine_.advance();
 }
@@ -139,6 +140,7 @@ void Exchanges::on_newest() {
   if (!waiting_) return;
   const Waiting waiting = *std::exchange(waiting_, std::nullopt);
   answer(*waiting.way, waiting.id);
+  dialogue_.context().exchange_times.add((ServerClock::now() - waiting.since).count());
 }
 
 void Exchanges::abandon(std::uint32_t axis) {

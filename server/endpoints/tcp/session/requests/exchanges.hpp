@@ -60,6 +60,7 @@ class Exchanges final : public Audience::Waiter {
   struct Waiting {
     Way* way;
     std::uint64_t id;
+    ServerClock::time_point since;
   };
 
   struct AxisCommand {

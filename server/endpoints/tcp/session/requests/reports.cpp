@@ -5,6 +5,7 @@
 #include <string_view>
 
 #include "plant/parameters/parameters.hpp"
+#include "protocols/resident_memory.hpp"
 #include "protocols/sample_codec.hpp"
 #include "protocols/signals/catalogue.hpp"
 #include "protocols/text.hpp"
@@ -147,7 +148,16 @@ void report_status(Dialogue& dialogue) {
   status.set_mode(wire_mode(engine.config().mode));
   status.set_tick(static_cast<std::uint64_t>(engine.tick()));
   status.set_late_ticks(engine.newest(0).late_ticks);
-  status.set_worst_lateness_s(static_cast<double>(engine.worst_lateness_ns()) * 1e-9);
+  if (engine.config().mode == RunMode::kRealtime) {
+    const SharedOctaveHistogram::View lateness = engine.lateness();
+    status.set_worst_lateness_s(static_cast<double>(lateness.worst_ns) * 1e-9);
+    status.mutable_lateness_counts()->Assign(lateness.buckets.begin(), lateness.buckets.end());
+    status.set_lateness_sum_s(static_cast<double>(lateness.sum_ns) * 1e-9);
+  }
+  const OctaveHistogram& exchanges = context.exchange_times;
+  status.mutable_exchange_counts()->Assign(exchanges.buckets().begin(), exchanges.buckets().end());
+  status.set_exchange_sum_s(static_cast<double>(exchanges.sum_ns()) * 1e-9);
+  status.set_resident_bytes(resident_bytes());
   status.set_sessions(static_cast<std::uint32_t>(context.session_count()));
   if (const Recorder* recorder = engine.recorder()) {
     status.set_recording(utf8(recorder->file()));
