@@ -58,6 +58,14 @@ void add_run(CLI::App& app, ServerOptions& o) {
   app.add_flag("--allow-odd", o.allow_odd, "take values that hardly any machine has; only warn");
   app.add_flag("--allow-overload", o.allow_overload,
                "in real time: start with a CAN bus that cannot carry all frames");
+  auto* messages = app.add_option("--messages", o.messages,
+                                  "tell the device under test what the [[message]] tables of this file say")
+                       ->type_name("FILE")
+                       ->check(not_empty);
+  app.add_option("--lines", o.lines, "the file or FIFO that takes lines of --messages")
+      ->type_name("FILE")
+      ->check(not_empty)
+      ->needs(messages);
   app.add_option("--experiments", o.experiments, "keep experiments in this folder and let clients run them")
       ->type_name("FOLDER")
       ->check(not_empty);

@@ -33,6 +33,8 @@ struct ServerOptions {
   double chunk_ms = 0.0;       ///< plant time that a kill may cost a recording; 0: the default
   bool require_realtime = false;
   bool measure_answers = false;  ///< for the verdict in JSON
+  std::string messages;          ///< a file of messages to the device under test
+  std::string lines;             ///< takes those that are lines
   std::string print;             ///< prints the description of an interface instead of a run
   std::size_t bus = 1;
 };

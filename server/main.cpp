@@ -29,6 +29,7 @@
 #include "server/host/service_notification.hpp"
 #include "server/host/stop_signal.hpp"
 #include "server/interface_text.hpp"
+#include "server/messages/device_messages.hpp"
 #include "server/pacing/pacer.hpp"
 #include "server/recording/replay.hpp"
 #include "server/replay_command.hpp"
@@ -124,7 +125,15 @@ nlohmann::json answer_rows(const Engine& engine) {
   return rows;
 }
 
-void print_verdict(const ServerOptions& o, const Verdict& v, const Engine& engine) {
+/// What the device under test was told.
+nlohmann::json message_rows(const std::vector<DeviceMessages::Outcome>& outcomes) {
+  nlohmann::json rows = nlohmann::json::array();
+  for (const DeviceMessages::Outcome& each : outcomes)
+    rows.push_back({{"tick", each.tick}, {"text", each.text}, {"problem", each.problem}});
+  return rows;
+}
+
+void print_verdict(const ServerOptions& o, const Verdict& v, const Engine& engine, DeviceMessages* messages) {
   if (o.json) {
     nlohmann::json verdict{{"event", "verdict"},
                            {"mode", name_of(v.mode)},
@@ -141,6 +150,7 @@ void print_verdict(const ServerOptions& o, const Verdict& v, const Engine& engin
                            {"recording", v.recording},
                            {"sentence", v.sentence()}};
     if (o.measure_answers) verdict["answers"] = answer_rows(engine);
+    if (messages != nullptr) verdict["messages"] = message_rows(messages->outcomes());
     return print_line(verdict);
   }
   print_line(fmt::format("{}; state hash {:016x}", v.sentence(), v.state_hash));
@@ -321,6 +331,13 @@ int serve(const ServerOptions& o, const BenchConfig& config) {
   // Before the recording: a port in use must not leave a recording behind.
   StreamServer server(io, config.tcp, config.tls);
   Transports transports(io, config);
+  std::optional<DeviceMessages> messages;
+  if (!o.messages.empty()) {
+    messages.emplace(read_messages(o.messages, config), o.lines,
+                     [&transports](std::size_t bus, const can::Frame& frame) {
+                       return transports.send_frame(bus, frame);
+                     });
+  }
   std::unique_ptr<Audit> audit;
   if (!config.audit.file.empty()) audit = std::make_unique<Audit>(config.audit);
   std::unique_ptr<Experiments> experiments;
@@ -328,6 +345,7 @@ int serve(const ServerOptions& o, const BenchConfig& config) {
   const std::unique_ptr<Engine> engine = make_engine(o, config, io, *stop_signal);
   if (!o.from.empty()) go_to_saved_state(*engine, o.from);
   if (o.measure_answers) engine->measure_answers();
+  if (messages) messages->serve(*engine);
   if (audit) audit->watch(*engine);
   if (audit) note_start(*audit, *engine);
   server.serve(
@@ -362,7 +380,7 @@ int serve(const ServerOptions& o, const BenchConfig& config) {
   transports.close();
   server.close();
   if (audit) note_end(*audit, *engine, verdict);
-  print_verdict(o, verdict, *engine);
+  print_verdict(o, verdict, *engine, messages ? &*messages : nullptr);
   return broken ? kFailed : exit_code(o, verdict);
 }
 
@@ -371,6 +389,7 @@ int use_bench(const ServerOptions& o) {
   if (!o.print.empty()) {
     fmt::print("{}", interface_text(config, o.print, o.bus));
   } else if (o.check_config) {
+    if (!o.messages.empty()) read_messages(o.messages, config);
     print_checked(o, config);
   } else {
     return serve(o, config);

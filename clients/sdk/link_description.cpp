@@ -22,7 +22,8 @@ void add_axis(abi::Description& d, const v1::AxisDescription& axis) {
               .phases = axis.phases(),
               .field_winding = axis.field_winding() ? 1 : 0,
               .parameter_count = 0,
-              .parameters = nullptr});
+              .parameters = nullptr,
+              .shares_amplifier_with = d.keep(axis.shares_amplifier_with())});
 }
 
 void add_faults(abi::Description& d, const v1::BenchDescription& bench) {

@@ -254,6 +254,7 @@ typedef struct drivebench_axis {
   int32_t field_winding;    /**< 1: the field has terminals of its own */
   size_t parameter_count;
   const drivebench_parameter* parameters;
+  const char* shares_amplifier_with; /**< the axis whose amplifier drives this machine, too; "": none */
 } drivebench_axis;
 
 /** A bit of drivebench_sample.faults. */

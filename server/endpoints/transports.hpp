@@ -22,6 +22,8 @@ class Transports {
   void close();
 
   std::vector<std::string> can_names() const;
+  /// can::Endpoint::send_frame() of a bus of the configuration.
+  std::string send_frame(std::size_t bus, const can::Frame& frame) { return can_.at(bus)->send_frame(frame); }
   std::string modbus_address() const;  ///< empty: none
 
  private:

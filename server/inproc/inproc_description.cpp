@@ -7,7 +7,9 @@
 namespace drivebench {
 namespace {
 
-void add_axis(abi::Description& d, const AxisConfig& config, const AxisParameters& p) {
+void add_axis(abi::Description& d, const BenchConfig& bench, std::size_t axis, const AxisParameters& p) {
+  const AxisConfig& config = bench.axes[axis];
+  const std::optional<std::size_t> sharer = bench.setup.axes[axis].shares_amplifier_with;
   for (const Parameter& row : axis_parameters(p)) {
     d.add_parameter({.name = d.keep(row.name),
                      .unit = d.keep(row.unit),
@@ -27,7 +29,8 @@ void add_axis(abi::Description& d, const AxisConfig& config, const AxisParameter
               .phases = static_cast<std::uint32_t>(terminal_count(terminals.connection)),
               .field_winding = terminals.field ? 1 : 0,
               .parameter_count = 0,
-              .parameters = nullptr});
+              .parameters = nullptr,
+              .shares_amplifier_with = d.keep(sharer ? bench.axes[*sharer].name : "")});
 }
 
 void add_faults(abi::Description& d) {
@@ -65,7 +68,7 @@ void InprocBench::describe_bench() {
   d.seed = setup.seed;
   d.configuration_hash = configuration_hash(config_);
   for (std::size_t axis = 0; axis < config_.axes.size(); ++axis)
-    add_axis(description_, config_.axes[axis], bench_.axis(axis).parameters());
+    add_axis(description_, config_, axis, bench_.axis(axis).parameters());
   add_faults(description_);
   for (const EventState& event : event_states(config_, bench_)) {
     description_.add_event(

@@ -45,6 +45,102 @@ def record_a_run(path):
             raise RuntimeError(server.errors())
 
 
+MULTISINES = """
+[[axis.multisine]]
+load_nm = 5e-4
+from_hz = 2.0
+to_hz = 500.0
+period_s = 0.5
+periods = 6
+at_s = 0.2
+[[axis.multisine]]
+current_offset_a = 0.01
+from_hz = 10.0
+to_hz = 100.0
+period_ticks = 800
+periods = 2
+ratio = 1.3
+when = "speed_rad_s > 10"
+for_s = 0.01
+"""
+# Every kind of step, a matrix, draws, and checks with a formula, a reference and a response.
+STEPS = """bench = "servo"
+duration_s = 0.5
+[dut]
+command = ["./loop"]
+link = "can"
+[[step]]
+at_s = 0.1
+line = "speed 100"
+[[step]]
+when = "speed_rad_s > 10"
+for_s = 0.01
+delay_s = 0.02
+can = {id = 0x201, data = "0f 00", fd = false}
+[[step]]
+at_s = 0.2
+modbus = {to = "127.0.0.1:1502", unit = 7, register = 100, values = [1500, 2]}
+[[step]]
+at_s = 0.2
+multisine = {load_nm = 5e-4, from_hz = 2.0, to_hz = 500.0, period_s = 0.05, periods = 6}
+[[step]]
+at_s = 0.3
+parameter = "mechanics.friction_nms"
+value = 1e-4
+ramp_s = 0.1
+[[step]]
+at_s = 0.3
+fault = "open_phase"
+value = 2
+[[check]]
+kind = "energy"
+formula = "2.5 [ohm]*i_a_a^2 - max(servo.torque_nm, 0 [N*m])*abs(-speed_rad_s)"
+max = 10.0
+[[check]]
+kind = "tube"
+signal = "i_a_a"
+reference = "book/8.2.2"
+abs = 0.5
+[[check]]
+kind = "frequency_response"
+min_phase_margin_deg = 40.0
+[matrix]
+step.5.value = [1, 2]
+[draw]
+count = 2
+seed = 7
+[draw.of]
+check.0.max = {uniform = [1.0, 2.0]}
+"""
+ATTACHED = """bench = "rig.toml"
+mode = "realtime"
+duration_s = 2.0
+[dut]
+attached = "can"
+time_limit_s = 30
+[dut.can]
+backend = "socketcan"
+channel = "can0"
+[[step]]
+at_s = 0.5
+load_nm = 0.2
+[[check]]
+kind = "never"
+condition = "state == 4"
+"""
+MESSAGES = """[[message]]
+at_s = 0.1
+line = "speed 100"
+[[message]]
+axis = "two"
+when = "one.speed_rad_s > 10"
+for_ticks = 5
+delay_s = 0.02
+can = {id = 0x1fffffff, extended = true, bus = 1, data = "0f 00 10 27 00 00 00 00 00 00 00 01"}
+[[message]]
+at_tick = 7
+modbus = {to = "[::1]:1502", unit = 7, register = 65535, values = [1]}
+"""
 # Two axes on one shaft, curves, and every kind of scheduled event.
 DYNAMOMETER = """
 [[axis.set]]
@@ -268,6 +364,12 @@ def make_experiments():
             shape(channel=pb.CHANNEL_Q, constant=shape.Constant(value=3.0))])).SerializeToString())
 
 
+def make_suites():
+    put("suite", "steps.toml", STEPS.encode())
+    put("suite", "attached.toml", ATTACHED.encode())
+    put("messages", "kinds.toml", MESSAGES.encode())
+
+
 def make_configs():
     inline = (BENCHES / "servo-realtime.toml").read_text(encoding="utf-8")
     motor = (BENCHES.parent / "motors/servo-im.toml").read_text(encoding="utf-8")
@@ -276,6 +378,7 @@ def make_configs():
     inline += '[[axis.load]]\nat_s = 0.5\nload_nm = 0.1\nramp_s = 0.01\n'
     put("config", "servo-realtime.toml", re.sub(r"[ ]*#.*", "", inline).encode())
     put("config", "dynamometer.toml", (re.sub(r"[ ]*#.*", "", inline) + DYNAMOMETER).encode())
+    put("config", "multisine.toml", (re.sub(r"[ ]*#.*", "", inline) + MULTISINES).encode())
     put("config", "missing-motor.toml", (BENCHES / "servo.toml").read_bytes())
     put("config", "letters.toml", "ä = 1\nn\u0291me = 2\nwin[\u1200\n".encode())  # once undefined behaviour in toml++
     put("config", "oddities.toml", b'bench.name = "\\u00e9\\n"\nbench.mode = \'lockstep\'\nbench = { period_us = 0x7d }\n'
@@ -399,6 +502,7 @@ if __name__ == "__main__":
     make_messages()
     make_experiments()
     make_configs()
+    make_suites()
     make_curves()
     make_modbus_streams()
     make_can_frames()

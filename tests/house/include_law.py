@@ -47,11 +47,11 @@ COSTLY = {
 # Rooms that stand in an order, low to high; in all other folders it is enough that the rooms form no circle. The files
 # beside the rooms stand above them all.
 ORDERED = {
-    "server": ("host", "bench", "config", "inproc", "fmu", "pacing", "recording", "engine", "access", "experiments", "endpoints"),
+    "server": ("host", "bench", "config", "inproc", "fmu", "pacing", "recording", "engine", "messages", "access", "experiments", "endpoints"),
     "clients/control": ("math", "gains", "moves", "loop", "estimators", "dc", "wound_dc", "induction", "synchronous",
                         "salient", "presets"),
     "clients/identification": ("math", "data", "motors", "refinement", "wiring"),
-    "clients/regression": ("tables", "checks", "suite", "shrink", "timing", "verdicts", "reports", "results"),
+    "clients/regression": ("tables", "formulas", "checks", "suite", "shrink", "timing", "verdicts", "reports", "results"),
 }
 
 # Files beside rooms that the rooms may include. They count as rooms of their own in the search for circles.

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <bit>
 #include <charconv>
 #include <cmath>
@@ -17,7 +18,7 @@
 #include "clients/command/recording/recorded_samples.hpp"
 #include "clients/command/regression/bundles/bundle.hpp"
 #include "clients/command/regression/cases/run_case.hpp"
-#include "clients/command/regression/cases/server_answers.hpp"
+#include "clients/command/regression/cases/server_report.hpp"
 #include "clients/command/regression/failures/serve_failure.hpp"
 #include "clients/command/regression/test.hpp"
 #include "clients/regression/reports/reports.hpp"
@@ -172,6 +173,11 @@ bool is_program(const PreparedCase& prepared) {
   return prepared.what->device.kind == regression::DeviceUnderTest::Kind::kProgram;
 }
 
+bool has_messages(const regression::Case& c) {
+  using regression::Step;
+  return std::ranges::any_of(c.steps, [](const Step& step) { return step.action == Step::Action::kMessage; });
+}
+
 /// A sentence on a program that was started in the middle of the recorded run.
 std::string beginning(const RepeatedPart& part, double period_s) {
   return fmt::format(
@@ -188,12 +194,19 @@ int run_again(const RerunOptions& options, const Unpacked& bundle, const Prepare
         "--from: the case runs in real time, where the bench waits for no device; --interactive serves it in "
         "lockstep");
   }
+  if (part && has_messages(*prepared.what)) {
+    throw UsageError(
+        "--from: the case has messages to its device under test: one that begins in the middle would lack "
+        "those of before");
+  }
   const CaseResult result = run_case(prepared, folder, {.repeats = part});
   fmt::print("{}", regression::table_row(result));
   record_case(prepared, folder, part);
   if (bundle.program != options.program)
     fmt::print("the bundle is of {}, this is {}\n", bundle.program, options.program);
-  if (part && is_program(prepared)) {
+  if (prepared.what->device.kind == regression::DeviceUnderTest::Kind::kAttached) {
+    fmt::print("the device under test was not started anew: no samples are compared\n");
+  } else if (part && is_program(prepared)) {
     if (fs::exists(recording_in(folder))) fmt::print("{}\n", beginning(*part, prepared.facts.period_s));
   } else if (fs::exists(bundle.recording) && fs::exists(recording_in(folder))) {
     fmt::print("{}\n", comparison(bundle.recording, recording_in(folder), prepared.facts));

@@ -31,15 +31,15 @@ std::string in_shell(const std::string& word) {
 }
 
 /// A program of Slurm, and what it printed.
-struct Answer {
+struct SlurmAnswer {
   int code;
   std::vector<std::string> lines;
 };
 
-Answer answer_of(const std::vector<std::string>& arguments, const std::string& error_file) {
+SlurmAnswer answer_of(const std::vector<std::string>& arguments, const std::string& error_file) {
   Process process(arguments, {.error_file = error_file});
   const Process::Deadline deadline = Process::in(kPatience);
-  Answer answer{.code = 0, .lines = {}};
+  SlurmAnswer answer{.code = 0, .lines = {}};
   while (std::optional<std::string> line = process.read_line(deadline))
     answer.lines.push_back(std::move(*line));
   const std::optional<int> code = process.wait(deadline);
@@ -64,6 +64,7 @@ std::string sbatch_script(const TestOptions& options, const fs::path& suite, con
   }
   std::string command = fmt::format("exec {} test {} --shard auto --results {} --jobs {}", in_shell(program),
                                     in_shell(fs::absolute(suite)), in_shell(results), options.jobs);
+  if (options.retries != 0) command += fmt::format(" --retries {}", options.retries);
   if (!options.filter.empty()) command += " --filter " + in_shell(options.filter);
   for (const std::string& tag : options.wanted_tags)
     command += " --tag " + in_shell(tag);
@@ -89,7 +90,7 @@ int submit_to_slurm(const TestOptions& options, const fs::path& suite) {
   fs::create_directories(results, error);
   const fs::path script = results / "slurm.sbatch";
   write_file(script, sbatch_script(options, suite, own_executable(), fs::current_path()));
-  const Answer answer = answer_of({"sbatch", "--parsable", script.string()}, "");
+  const SlurmAnswer answer = answer_of({"sbatch", "--parsable", script.string()}, "");
   if (answer.code == kNoSuchProgram)
     throw UsageError("--slurm: this machine has no sbatch, the program of Slurm that takes jobs");
   // JOB, or JOB;CLUSTER
@@ -111,7 +112,7 @@ std::string slurm_state(const fs::path& results) {
   std::string job;
   if (!(in >> job) || job.find_first_not_of("0123456789") != std::string::npos) return {};
   // Of all jobs: a question for one that Slurm has forgotten fails like one without an answer.
-  const Answer answer = answer_of({"squeue", "--noheader", "--array", "--format=%F %T"}, "/dev/null");
+  const SlurmAnswer answer = answer_of({"squeue", "--noheader", "--array", "--format=%F %T"}, "/dev/null");
   if (answer.code == kNoSuchProgram) return fmt::format("Slurm job {}: this machine has no squeue", job);
   if (answer.code != 0) return fmt::format("Slurm job {}: squeue reaches no controller", job);
   std::map<std::string, int> tasks;  // by their state

@@ -10,6 +10,7 @@
 #include <string>
 #include <thread>
 
+#include "clients/command/common/session/session.hpp"
 #include "clients/command/regression/bundles/bundle.hpp"
 #include "clients/command/regression/cases/run_case.hpp"
 #include "clients/command/regression/pages/html_report.hpp"
@@ -42,9 +43,7 @@ class Crew {
   void work() {
     for (std::size_t index = next_++; index < cases_.size(); index = next_++) {
       const fs::path folder = folder_ / std::to_string(index);
-      fs::create_directory(folder);
-      CaseResult result = run_case(cases_[index], folder,
-                                   {.trace = settings_.draws_plots, .timing = settings_.measures_timing});
+      CaseResult result = run(cases_[index], folder);
       result.plots = plots_of(result);
       result.trace = {};
       keep(cases_[index], folder, result);
@@ -55,6 +54,24 @@ class Crew {
       results_[index] = std::move(result);
       ++ended_;
       ready_.notify_one();
+    }
+  }
+
+  /// Runs a case, and again if the bench was late. Only one case at a time has the bus of an attached drive.
+  CaseResult run(const PreparedCase& prepared, const fs::path& folder) {
+    using enum regression::DeviceUnderTest::Kind;
+    std::unique_lock bus(bus_, std::defer_lock);
+    if (prepared.what->device.kind == kAttached) bus.lock();
+    for (unsigned retries = 0;; ++retries) {
+      fs::create_directory(folder);
+      CaseResult result =
+          run_case(prepared, folder, {.trace = settings_.draws_plots, .timing = settings_.measures_timing});
+      if (result.verdict != regression::Verdict::kInvalid || interrupted()) return result;
+      if (retries == settings_.retries) {
+        if (retries != 0) result.reason += fmt::format(", in the last of {} runs", retries + 1);
+        return result;
+      }
+      fs::remove_all(folder);
     }
   }
 
@@ -86,6 +103,7 @@ class Crew {
   const std::vector<PreparedCase>& cases_;
   fs::path folder_;
   SuiteSettings settings_;
+  std::mutex bus_;
   std::mutex mutex_;
   std::condition_variable ready_;
   std::vector<std::optional<CaseResult>> results_;

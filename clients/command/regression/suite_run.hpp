@@ -10,6 +10,7 @@ namespace drivebench::command {
 
 struct SuiteSettings {
   unsigned jobs = 1;
+  unsigned retries = 0;                 ///< of a case in which real time was not kept
   bool draws_plots = false;             ///< of failed checks
   bool measures_timing = false;         ///< of the devices under test
   std::filesystem::path keep_folder{};  ///< for bundles of cases that have not passed; empty: none is kept

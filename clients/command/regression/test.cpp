@@ -149,6 +149,7 @@ Work work_of(std::vector<Case> cases, StoredResults* stored) {
 
 SuiteSettings settings_of(const TestOptions& options, const Work& work, const StoredResults* stored) {
   SuiteSettings settings{.jobs = options.jobs,
+                         .retries = options.retries,
                          .draws_plots = stored != nullptr || !options.html_file.empty(),
                          .measures_timing = !options.timing_file.empty(),
                          .keep_folder = options.keep_folder,

@@ -13,6 +13,7 @@ struct TestOptions {
   std::string program;  ///< version and build: results of another one are not taken for those of this one
   std::string suite;
   unsigned jobs = 1;
+  unsigned retries = 0;  ///< of a case in which real time was not kept
   bool list = false;
   std::string filter{};  ///< part of the names of cases
   std::vector<std::string> wanted_tags{};

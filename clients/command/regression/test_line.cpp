@@ -61,6 +61,10 @@ void add_choice(CLI::App& sub, TestOptions& o) {
       ->type_name("NUMBER")
       ->capture_default_str()
       ->check(whole_between(1, 1024));
+  sub.add_option("--retries", o.retries, "run a case so often again if the bench was late in it")
+      ->type_name("NUMBER")
+      ->capture_default_str()
+      ->check(whole_between(0, 100));
 }
 
 void add_reports(CLI::App& sub, TestOptions& o) {

@@ -46,6 +46,14 @@ AxisCondition::AxisCondition(const CaseCondition& condition, const RunFacts& fac
     : condition_(condition.named.condition),
       axis_(condition.named.axis.empty() ? axis : find_axis(facts, condition.named.axis)) {}
 
+WatchedValue::WatchedValue(const Signal& signal, std::shared_ptr<const Formula> formula,
+                           const RunFacts& facts, std::size_t axis)
+    : signal_(&signal), formula_(std::move(formula)), axis_(axis) {
+  if (!formula_) return;
+  for (const std::string& name : formula_->axes())
+    places_.push_back(find_axis(facts, name));
+}
+
 Check::Check(const CheckSpec& spec, const RunFacts& facts)
     : spec_(spec),
       axis_(find_axis(facts, spec.axis)),
@@ -57,6 +65,7 @@ Check::Check(const CheckSpec& spec, const RunFacts& facts)
       last_tick_(to_ticks_) {
   if (spec.after) after_.emplace(*spec.after, facts, axis_);
   if (spec.condition) condition_.emplace(*spec.condition, facts, axis_);
+  if (spec.signal != nullptr) value_.emplace(*spec.signal, spec.formula, facts, axis_);
 }
 
 void Check::see(std::span<const Sample> axes) noexcept {
@@ -74,7 +83,7 @@ void Check::see(std::span<const Sample> axes) noexcept {
     take(sample, condition_->holds(axes) ? 1.0 : 0.0);
     return;
   }
-  const double value = spec_.signal != nullptr ? value_of(*spec_.signal, sample) : 0.0;
+  const double value = value_ ? value_->of(axes) : 0.0;
   if (std::isfinite(value)) {
     take(sample, value);
   } else if (!not_finite_at_) {

@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <limits>
+#include <memory>
 #include <optional>
 #include <span>
 #include <string>
@@ -10,6 +11,8 @@
 #include <vector>
 
 #include "clients/regression/checks/frequency_response.hpp"
+#include "clients/regression/checks/golden.hpp"
+#include "clients/regression/formulas/formula.hpp"
 #include "protocols/condition.hpp"
 #include "protocols/multisine.hpp"
 #include "protocols/signals/catalogue.hpp"
@@ -44,8 +47,9 @@ struct CheckSpec {
   const CheckKind* kind = nullptr;
   std::string name;
   int line = 0;
-  std::string axis{};  ///< name or number; empty: that of the device under test
-  const Signal* signal = nullptr;
+  std::string axis{};              ///< name or number; empty: that of the device under test
+  const Signal* signal = nullptr;  ///< or the label of the formula
+  std::shared_ptr<const Formula> formula{};
   double from_s = 0.0;           ///< of the window; with `after`, since the trigger
   std::optional<double> to_s{};  ///< empty: to the end
   bool has_window = false;       ///< from_s or after stands in the case file
@@ -53,8 +57,10 @@ struct CheckSpec {
   std::optional<CaseCondition> condition{};
   std::string fault{};
   std::string golden_file{};
-  std::optional<std::size_t> step{};                           ///< that excites what the check measures
-  std::optional<Excitation> excitation{};                      ///< of that step
+  std::string reference{};                        ///< a preset whose run on the same bench is the golden one
+  std::shared_ptr<const Golden> reference_run{};  ///< once it has run
+  std::optional<std::size_t> step{};              ///< that excites what the check measures
+  std::optional<Excitation> excitation{};         ///< of that step
   std::vector<std::pair<std::string_view, double>> numbers{};  ///< the other keys
 
   std::optional<double> number(std::string_view key) const noexcept;
@@ -90,11 +96,28 @@ class AxisCondition {
   std::size_t axis_;
 };
 
+/// The value of a signal or a formula in the samples of a tick.
+class WatchedValue {
+ public:
+  /// `signal` is the label of the formula, if there is one.
+  WatchedValue(const Signal& signal, std::shared_ptr<const Formula> formula, const RunFacts& facts,
+               std::size_t axis);
+  double of(std::span<const Sample> axes) const noexcept {
+    return formula_ ? formula_->value(axes, axis_, places_) : value_of(*signal_, axes[axis_]);
+  }
+
+ private:
+  const Signal* signal_;
+  std::shared_ptr<const Formula> formula_;
+  std::size_t axis_;
+  std::vector<std::size_t> places_{};  ///< of the formula's other axes
+};
+
 /// The outcome of a check.
 struct Finding {
   std::string name;
   std::string kind;
-  std::string signal;  ///< that it is about; empty: a fault
+  std::string signal;  ///< that it is about, or its formula; empty: a fault
   std::string axis;
   std::string unit;  ///< of the numbers
   bool passed = false;
@@ -156,6 +179,7 @@ class Check {
   std::size_t axis_;
   std::optional<AxisCondition> after_{};
   std::optional<AxisCondition> condition_{};
+  std::optional<WatchedValue> value_{};
   double facts_period_s_;
   std::uint64_t from_ticks_;
   std::uint64_t to_ticks_;

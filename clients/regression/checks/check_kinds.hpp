@@ -50,7 +50,7 @@ std::string problem_on_bench(const CheckSpec& spec, const RunFacts& facts);
 
 // ---- the families of kinds, each in a file of its own ----
 
-std::span<const CheckKind> value_checks() noexcept;      ///< bounds, rms, ripple, steady_state
+std::span<const CheckKind> value_checks() noexcept;      ///< bounds, rms, ripple, energy, steady_state
 std::span<const CheckKind> step_checks() noexcept;       ///< settles, overshoot, rise_time
 std::span<const CheckKind> spectrum_checks() noexcept;   ///< thd
 std::span<const CheckKind> response_checks() noexcept;   ///< frequency_response

@@ -36,6 +36,18 @@ const Signal* read_signal(KeyTable& table) {
   return signal;
 }
 
+/// A formula in the place of a signal.
+void read_formula(KeyTable& table, CheckSpec& spec) {
+  if (table.node("signal") != nullptr) table.report("formula", "cannot stand beside signal");
+  const std::optional<std::string> text = table.text("formula");
+  if (!text) return;
+  auto parsed = Formula::parse(*text);
+  if (const auto* const why = std::get_if<std::string>(&parsed))
+    return table.report("formula", fmt::format("is \"{}\" but {}", printable(*text), *why));
+  spec.formula = std::get<std::shared_ptr<const Formula>>(std::move(parsed));
+  spec.signal = &spec.formula->label();
+}
+
 /// The keys of what the kind watches.
 void read_watched(KeyTable& table, const std::filesystem::path& folder, CheckSpec& spec) {
   if (spec.kind->watches == Watches::kCondition) {
@@ -48,11 +60,16 @@ void read_watched(KeyTable& table, const std::filesystem::path& folder, CheckSpe
     if (table.has("signal")) spec.signal = read_signal(table);
     table.node("signal");  // may stand here
     if (const auto step = table.integer("step", 0, kMostSteps)) spec.step = static_cast<std::size_t>(*step);
+  } else if (spec.kind->watches == Watches::kSignal && table.has("formula")) {
+    read_formula(table, spec);
   } else {
     spec.signal = read_signal(table);
   }
   if (spec.kind->watches != Watches::kGolden) return;
-  table.require("golden");
+  spec.reference = table.text("reference").value_or("");
+  if (table.has("golden") == table.has("reference"))
+    table.report("golden",
+                 "or else reference must stand in a tube: a file, or a controller of `drivebench control`");
   if (const auto file = table.text("golden")) spec.golden_file = (folder / *file).lexically_normal().string();
 }
 
@@ -63,7 +80,7 @@ bool is_complete(const CheckSpec& spec) {
     case Watches::kFault:
       return !spec.fault.empty();
     case Watches::kGolden:
-      return spec.signal != nullptr && !spec.golden_file.empty();
+      return spec.signal != nullptr && (!spec.golden_file.empty() || !spec.reference.empty());
     case Watches::kResponse:
       return true;
     case Watches::kSignal:

@@ -10,13 +10,15 @@
 namespace drivebench::regression {
 namespace {
 
-/// The signal stays within abs + rel·|golden| of a golden run, tick by tick. A tick that the golden run lacks
-/// is compared with the one before it, so that it may be decimated.
+/// The signal stays within abs + rel·|golden| of a golden run or of that of a reference controller, tick by
+/// tick. A tick that the golden run lacks is compared with the one before it, so that it may be decimated.
 class Tube final : public Check {
  public:
   Tube(const CheckSpec& spec, const RunFacts& facts)
       : Check(spec, facts),
-        golden_(read_golden(spec.golden_file, spec.signal->name)),
+        golden_(spec.reference_run       ? *spec.reference_run
+                : spec.reference.empty() ? read_golden(spec.golden_file, spec.signal->name)
+                                         : Golden{}),
         abs_(spec.number_or("abs", 0.0)),
         rel_(spec.number_or("rel", 0.0)) {}
 
@@ -61,6 +63,7 @@ class Tube final : public Check {
 
 std::string problem_with_tube(const CheckSpec& spec) {
   if (!spec.number("abs") && !spec.number("rel")) return "needs abs, rel or both";
+  if (!spec.reference.empty()) return {};
   const std::string problem = read_golden(spec.golden_file, spec.signal->name).problem;
   return problem.empty() ? std::string() : "golden " + problem;
 }

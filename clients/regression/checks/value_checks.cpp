@@ -146,6 +146,40 @@ class SteadyState final : public Check {
   std::uint64_t worst_tick_ = 0;
 };
 
+/// The integral of a power over time, by the trapezoidal rule.
+class Energy final : public Check {
+ public:
+  Energy(const CheckSpec& spec, const RunFacts& facts) : Check(spec, facts), tick_s_(facts.period_s) {}
+
+ private:
+  void take(const Sample& sample, double value) noexcept override {
+    if (samples() > 1) sum_j_ += 0.5 * (before_w_ + value) * tick_s_;
+    before_w_ = value;
+    if (std::abs(value) <= largest_w_) return;
+    largest_w_ = std::abs(value);
+    worst_tick_ = sample.tick;
+  }
+  Outcome outcome() const override {
+    const double high = spec().number_or("max", kInfinite);
+    const double low = spec().number_or("min", -kInfinite);
+    const bool is_low = sum_j_ < low;
+    const double limit = is_low || high == kInfinite ? low : high;
+    return {.passed = !is_low && sum_j_ <= high,
+            .measured = sum_j_,
+            .limit = limit,
+            .worst_tick = worst_tick_,
+            .unit = "J",
+            .sentence = fmt::format("energy {}, {} {}", with_unit(sum_j_, "J"), limit == high ? "max" : "min",
+                                    with_unit(limit, "J"))};
+  }
+
+  double tick_s_;
+  double sum_j_ = 0.0;
+  double before_w_ = 0.0;
+  double largest_w_ = -1.0;
+  std::uint64_t worst_tick_ = 0;
+};
+
 std::string problem_with_bounds(const CheckSpec& spec) {
   const bool has_sides = spec.number("min") || spec.number("max");
   if (spec.number("abs").has_value() == has_sides) return "needs min, max or both, or else abs";
@@ -159,6 +193,15 @@ std::string problem_with_rms(const CheckSpec& spec) {
   return {};
 }
 
+std::string problem_with_energy(const CheckSpec& spec) {
+  if (dimension_of(spec.signal->unit) != dimension_of("W"))
+    return fmt::format("needs a power, but the unit of {} is {}", spec.signal->name, spec.signal->unit);
+  if (!spec.number("min") && !spec.number("max")) return "needs min, max or both";
+  return {};
+}
+
+constexpr auto kEnergy = std::to_array<NumberKey>(
+    {{"min", false, -kAnyNumber, kAnyNumber}, {"max", false, -kAnyNumber, kAnyNumber}});
 constexpr auto kBounds = std::to_array<NumberKey>({{"min", false, -kAnyNumber, kAnyNumber},
                                                    {"max", false, -kAnyNumber, kAnyNumber},
                                                    {"abs", false, 0.0, kAnyNumber}});
@@ -175,6 +218,7 @@ std::span<const CheckKind> value_checks() noexcept {
       {{"bounds", Watches::kSignal, false, kBounds, problem_with_bounds, make_check<Bounds>},
        {"rms", Watches::kSignal, false, kRms, problem_with_rms, make_check<Rms>},
        {"ripple", Watches::kSignal, false, kRipple, nullptr, make_check<Ripple>},
+       {"energy", Watches::kSignal, false, kEnergy, problem_with_energy, make_check<Energy>},
        {"steady_state", Watches::kSignal, false, kSteadyState, nullptr, make_check<SteadyState>}});
   return kKinds;
 }

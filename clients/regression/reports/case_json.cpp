@@ -103,12 +103,14 @@ Json case_json(const CaseResult& result) {
   Json checks = Json::array();
   for (const Finding& finding : result.findings)
     checks.push_back(finding_json(finding));
-  return {{"name", result.name},       {"file", result.file},
-          {"line", result.line},       {"values", values},
-          {"tags", result.tags},       {"verdict", word_of(result.verdict)},
-          {"reason", result.reason},   {"bench_s", result.bench_s},
-          {"samples", result.samples}, {"hash", fmt::format("{:016x}", result.hash)},
-          {"checks", checks},          {"output", result.output}};
+  Json object = {{"name", result.name},       {"file", result.file},
+                 {"line", result.line},       {"values", values},
+                 {"tags", result.tags},       {"verdict", word_of(result.verdict)},
+                 {"reason", result.reason},   {"bench_s", result.bench_s},
+                 {"samples", result.samples}, {"hash", fmt::format("{:016x}", result.hash)},
+                 {"checks", checks},          {"output", result.output}};
+  if (!result.messages.empty()) object["messages"] = result.messages;
+  return object;
 }
 
 CaseResult case_of(const Json& object) {
@@ -127,6 +129,7 @@ CaseResult case_of(const Json& object) {
   for (const Json& each : object.at("checks"))
     result.findings.push_back(finding_of(each));
   object.at("output").get_to(result.output);
+  if (object.contains("messages")) object.at("messages").get_to(result.messages);
   return result;
 }
 

@@ -3,176 +3,18 @@
 #include <fmt/core.h>
 
 #include <algorithm>
-#include <array>
 #include <set>
 #include <system_error>
 
 #include "clients/regression/checks/check_reader.hpp"
+#include "clients/regression/suite/device_reader.hpp"
 #include "clients/regression/suite/matrix.hpp"
+#include "clients/regression/suite/step_reader.hpp"
 #include "protocols/text.hpp"
 
 namespace drivebench::regression {
 namespace fs = std::filesystem;
 namespace {
-
-constexpr double kLongestCase_s = 1e6;
-
-/// `{a = {b = 1.0}}` as `a.b = 1.0`, as gains are named.
-void flatten(const ConfigNode& table, const std::string& prefix, KeyTable& gains, DeviceUnderTest& device) {
-  for (const ConfigNode& child : table.children) {
-    const std::string name = prefix + child.key;
-    const std::optional<double> value = number_in(child);
-    if (child.kind == ConfigNode::Kind::kTable) {
-      flatten(child, name + ".", gains, device);
-    } else if (value) {
-      device.gains.emplace_back(name, *value);
-    } else {
-      gains.report(name, "is " + described(child) + " but must be a finite number");
-    }
-  }
-}
-
-void read_link(KeyTable& table, DeviceUnderTest& device) {
-  using Link = DeviceUnderTest::Link;
-  static constexpr auto kWords =
-      std::to_array<std::pair<std::string_view, Link>>({{"unix", Link::kUnix},
-                                                        {"tcp", Link::kTcp},
-                                                        {"shm", Link::kSharedMemory},
-                                                        {"can", Link::kCan},
-                                                        {"modbus", Link::kModbus}});
-  const auto word = table.text("link");
-  if (!word) return;
-  if (device.kind != DeviceUnderTest::Kind::kProgram) table.report("link", "belongs to a command");
-  const auto found = std::ranges::find(kWords, *word, &std::pair<std::string_view, Link>::first);
-  if (found != kWords.end()) {
-    device.link = found->second;
-  } else {
-    table.report("link",
-                 fmt::format("is \"{}\" but must be \"unix\", \"tcp\", \"shm\", \"can\" or \"modbus\"",
-                             printable(*word)));
-  }
-}
-
-DeviceUnderTest read_device(KeyTable& table) {
-  DeviceUnderTest device;
-  device.line = table.line();
-  const auto preset = table.text("preset");
-  const ConfigNode* const gains = table.node("gains");
-  device.command = table.texts("command");
-  device.axis = table.text("axis").value_or("0");
-  device.time_limit_s = table.number("time_limit_s", 0.1, 86'400.0).value_or(device.time_limit_s);
-  if (preset) {
-    device.kind = DeviceUnderTest::Kind::kPreset;
-    device.preset = *preset;
-  } else if (table.has("command")) {
-    device.kind = DeviceUnderTest::Kind::kProgram;
-  } else {
-    table.require("preset");
-  }
-  if (preset && table.has("command")) table.report("command", "cannot stand beside preset");
-  read_link(table, device);
-  if (gains != nullptr && !preset) table.report("gains", "belongs to a preset");
-  if (gains != nullptr) {
-    if (auto inner = table.table("gains")) flatten(*gains, "", *inner, device);
-  }
-  table.finish();
-  return device;
-}
-
-/// What a check needs of a multisine; the bench judges the values.
-std::optional<Excitation> read_multisine(KeyTable& table, Step& step) {
-  std::optional<KeyTable> inner = table.table("multisine");
-  if (!inner) return std::nullopt;
-  step.multisine = *table.node("multisine");
-  const auto load_nm = inner->number("load_nm");
-  const auto offset_a = inner->number("current_offset_a");
-  if (inner->has("load_nm") == inner->has("current_offset_a")) {
-    inner->report("load_nm", "or else current_offset_a must stand in a multisine");
-  }
-  for (const std::string_view key : {"period_s", "periods", "from_hz", "to_hz"})
-    inner->require(key);
-  const auto period_s = inner->number("period_s", 0.0);
-  const auto periods = inner->integer("periods", 1, kMostMultisinePeriods);
-  const auto from_hz = inner->number("from_hz", 0.0);
-  const auto to_hz = inner->number("to_hz", 0.0);
-  const auto ratio = inner->number("ratio", kLeastMultisineRatio, kMostMultisineRatio);
-  inner->finish();
-  if ((!load_nm && !offset_a) || !period_s || !periods || !from_hz || !to_hz) return std::nullopt;
-  return Excitation{.is_load = load_nm.has_value(),
-                    .amplitude = load_nm.value_or(offset_a.value_or(0.0)),
-                    .begin_s = step.at_s.value_or(step.delay_s),
-                    .has_trigger = step.when.has_value(),
-                    .period_s = *period_s,
-                    .periods = static_cast<double>(*periods),
-                    .from_hz = *from_hz,
-                    .to_hz = *to_hz,
-                    .ratio = ratio.value_or(kDefaultMultisineRatio)};
-}
-
-/// Exactly one of the actions. The value of a parameter or a fault is for the bench to judge.
-void read_action(KeyTable& table, Step& step) {
-  struct Row {
-    std::string_view key;
-    Step::Action action;
-  };
-  static constexpr auto kActions = std::to_array<Row>({{"load_nm", Step::Action::kLoad},
-                                                       {"parameter", Step::Action::kParameter},
-                                                       {"fault", Step::Action::kFault},
-                                                       {"impulse_nms", Step::Action::kImpulse},
-                                                       {"multisine", Step::Action::kMultisine}});
-  const bool has_name = table.has("parameter") || table.has("fault");
-  std::size_t count = 0;
-  for (const Row& row : kActions) {
-    if (!table.has(row.key)) {
-      table.node(row.key);  // a key that may stand here
-      continue;
-    }
-    ++count;
-    step.action = row.action;
-    if (row.action == Step::Action::kMultisine) {
-      step.excitation = read_multisine(table, step);
-    } else if (row.action == Step::Action::kParameter || row.action == Step::Action::kFault) {
-      step.name = table.text(row.key).value_or("");
-    } else if (table.number(row.key)) {
-      step.value = *table.node(row.key);
-    }
-  }
-  if (count != 1) {
-    table.report("load_nm",
-                 fmt::format("is one of load_nm, parameter, fault, impulse_nms and multisine, of which a "
-                             "step has exactly one; here are {}",
-                             count));
-  }
-  const ConfigNode* const value = table.node("value");
-  if (has_name) table.require("value");
-  if (value == nullptr) return;
-  if (!has_name) table.report("value", "belongs to parameter and fault");
-  if (value->kind != ConfigNode::Kind::kScalar) table.report("value", "must be a single value");
-  step.value = *value;
-}
-
-Step read_step(KeyTable& table) {
-  Step step;
-  step.line = table.line();
-  step.axis = table.text("axis").value_or("0");
-  step.at_s = table.number("at_s", 0.0, kLongestCase_s);
-  step.when = read_condition(table, "when");
-  if (table.has("at_s") == table.has("when")) {
-    table.report("at_s", "or else when must stand in a step: a time, or a condition");
-  }
-  step.for_s = table.number("for_s", 0.0, kLongestCase_s).value_or(0.0);
-  step.delay_s = table.number("delay_s", 0.0, kLongestCase_s).value_or(0.0);
-  for (const std::string_view key : {"for_s", "delay_s"}) {
-    if (table.has(key) && !table.has("when")) table.report(key, "belongs to when");
-  }
-  read_action(table, step);
-  step.ramp_s = table.number("ramp_s", 0.0, kLongestCase_s).value_or(0.0);
-  if (table.has("ramp_s") && !table.has("load_nm") && !table.has("parameter")) {
-    table.report("ramp_s", "belongs to load_nm and parameter");
-  }
-  table.finish();
-  return step;
-}
 
 /// The step of a case whose multisine a check is about; null after a problem.
 const Step* exciting_step(KeyTable& root, const Case& c, const CheckSpec& check) {
@@ -233,12 +75,39 @@ void refuse_equal_names(KeyTable& root, const std::vector<CheckSpec>& checks) {
   }
 }
 
+/// A device under test must be there for a message, and hear it.
+void check_message(KeyTable& root, const DeviceUnderTest& device, const Step& step) {
+  using enum DeviceUnderTest::Kind;
+  if (step.message.key.empty()) return;  // it has a problem already
+  const auto report = [&](std::string_view rule) {
+    root.report("step", fmt::format("of line {} has {}, which {}", step.line, step.message.key, rule));
+  };
+  if (step.message.key == "line") {
+    if (device.kind != kProgram) report("belongs to a command: it goes to the standard input of the program");
+  } else if (device.kind != kProgram && device.kind != kAttached) {
+    report("belongs to a command or an attached drive");
+  } else if (step.message.key == "can" && device.link != DeviceUnderTest::Link::kCan) {
+    report("needs the device under test on a CAN bus");
+  }
+}
+
 /// The rules between the parts of a case.
 void check_whole(KeyTable& root, const Case& c) {
   using enum DeviceUnderTest::Kind;
-  if (c.device.kind == kNone && !c.duration_s) root.require("duration_s");
+  if ((c.device.kind == kNone || c.device.kind == kAttached) && !c.duration_s) root.require("duration_s");
+  if (c.device.kind == kAttached && !c.is_realtime) {
+    root.report("mode", "must be \"realtime\": an attached drive waits for no bench");
+  }
   if (c.is_realtime && c.device.kind == kPreset) {
     root.report("mode", "is \"realtime\", but a preset runs in lockstep");
+  }
+  for (const CheckSpec& check : c.checks) {
+    if (!check.reference.empty() && c.is_realtime)
+      root.report("check", fmt::format("\"{}\" (line {}) has a reference, which runs in lockstep", check.name,
+                                       check.line));
+  }
+  for (const Step& step : c.steps) {
+    if (step.action == Step::Action::kMessage) check_message(root, c.device, step);
   }
   if (c.checks.empty() && c.skip.empty())
     root.report("check", "is missing: a case without checks proves nothing");

@@ -92,13 +92,42 @@ class Composer {
     merge_overrides();
     for (ConfigNode& axis : axes())
       merge_motor(axis);
-    make_portable();
+    remove_places(bench_);
     add_link();
     set_mode();
     if (case_.seed) set(bench_table(), "seed", *case_.seed);
     for (const Step& step : case_.steps)
       add(step);
     problems_.throw_if_any();
+    return toml_text(bench_);
+  }
+
+  /// The messages of the case, each with the line at which it begins. The bench has the names of the axes.
+  std::vector<ComposedMessage> messages() {
+    std::optional<ConfigNode> bench = read(bench_file_);
+    problems_.throw_if_any();
+    bench_ = std::move(*bench);
+    std::vector<ComposedMessage> all;
+    for (const Step& step : case_.steps) {
+      if (step.action != Step::Action::kMessage) continue;
+      ConfigNode message = timed(step);
+      if (const ConfigNode* const on = axis(step.axis, step.line, "step.axis"))
+        set(message, "axis", text_of(*on, "name"));
+      message.children.push_back(step.message);
+      ConfigNode document = table_node("");
+      child_or_new(document, "message", Kind::kArray).children.push_back(std::move(message));
+      all.push_back({.line = step.line, .text = toml_text(document)});
+    }
+    problems_.throw_if_any();
+    return all;
+  }
+
+  /// The bench as it is, with the link of the case.
+  std::string linked_text() {
+    std::optional<ConfigNode> bench = read(bench_file_);
+    problems_.throw_if_any();
+    bench_ = std::move(*bench);
+    add_link();
     return toml_text(bench_);
   }
 
@@ -188,25 +217,35 @@ class Composer {
     set(axis, "motor_name", name);
   }
 
-  void make_portable() {
-    for (const std::string_view table : kTablesOfAPlace)
-      remove(bench_, table);
+  /// A bus of its own for a program, at a port that the system chooses; for an attached drive the one at
+  /// which it waits.
+  void add_link() {
+    using enum DeviceUnderTest::Link;
+    const bool is_attached = case_.device.kind == DeviceUnderTest::Kind::kAttached;
+    if (case_.device.link == kTcp && is_attached) {
+      merge(child_or_new(bench_, "tcp", Kind::kTable), case_.device.place);
+    } else if (case_.device.link == kModbus) {
+      ConfigNode& modbus = child_or_new(bench_, "modbus", Kind::kTable);
+      if (!is_attached) set(modbus, "port", std::int64_t{0});
+      set(modbus, "allow_writes", true);
+      merge(modbus, case_.device.place);
+    } else if (case_.device.link == kCan) {
+      add_bus(is_attached);
+    }
   }
 
-  /// A bus of its own for the device under test, at a port that the system chooses. Nodes of CAN count like
-  /// units of Modbus: from 1, in the order of the axes.
-  void add_link() {
-    if (case_.device.link == DeviceUnderTest::Link::kModbus) {
-      ConfigNode& modbus = child_or_new(bench_, "modbus", Kind::kTable);
-      set(modbus, "port", std::int64_t{0});
-      set(modbus, "allow_writes", true);
-    }
-    if (case_.device.link != DeviceUnderTest::Link::kCan) return;
+  /// Nodes of CAN count like units of Modbus: from 1, in the order of the axes. Those that an attached drive
+  /// knows are in its bench file.
+  void add_bus(bool is_attached) {
     ConfigNode bus = table_node("");
-    set(bus, "backend", std::string("slcan"));
-    set(bus, "channel", std::string("tcp:127.0.0.1:0"));
+    if (is_attached) {
+      merge(bus, case_.device.place);
+    } else {
+      set(bus, "backend", std::string("slcan"));
+      set(bus, "channel", std::string("tcp:127.0.0.1:0"));
+    }
     child_or_new(bench_, "can", Kind::kArray).children.push_back(std::move(bus));
-    for (std::size_t i = 0; i < axes().size(); ++i)
+    for (std::size_t i = 0; !is_attached && i < axes().size(); ++i)
       set(axes()[i], "can_node", static_cast<std::int64_t>(i) + 1);
   }
 
@@ -227,13 +266,32 @@ class Composer {
   void add(const Step& step) {
     ConfigNode* const on = axis(step.axis, step.line, "step.axis");
     if (on == nullptr) return;
+    if (step.action == Step::Action::kMessage) return;
+    ConfigNode event = timed(step);
+    add_action(event, step);
+    child_or_new(*on, std::string(table_of(step.action)), Kind::kArray).children.push_back(std::move(event));
+  }
+
+  /// A table with the time of a step.
+  ConfigNode timed(const Step& step) {
     ConfigNode event = table_node("");
-    if (step.at_s) set(event, "at_s", *step.at_s);
+    if (step.at_s && case_.device.kind == DeviceUnderTest::Kind::kAttached) {
+      add_time_since_arming(event, *step.at_s);
+    } else if (step.at_s) {
+      set(event, "at_s", *step.at_s);
+    }
     if (step.when) set(event, "when", step.when->text);
     if (step.for_s > 0.0) set(event, "for_s", step.for_s);
     if (step.delay_s > 0.0) set(event, "delay_s", step.delay_s);
-    add_action(event, step);
-    child_or_new(*on, std::string(table_of(step.action)), Kind::kArray).children.push_back(std::move(event));
+    return event;
+  }
+
+  /// A case with an attached drive begins when the drive arms.
+  void add_time_since_arming(ConfigNode& event, double at_s) {
+    const ConfigNode* const device = axis(case_.device.axis, case_.device.line, "dut.axis");
+    if (device == nullptr) return;
+    set(event, "when", fmt::format("{}.state == 1", text_of(*device, "name")));
+    if (at_s > 0.0) set(event, "delay_s", at_s);
   }
 
   static std::string_view table_of(Step::Action action) {
@@ -246,6 +304,7 @@ class Composer {
         return "bump";
       case Step::Action::kMultisine:
         return "multisine";
+      case Step::Action::kMessage:  // no event
       case Step::Action::kLoad:
         break;
     }
@@ -273,6 +332,19 @@ class Composer {
 
 std::string composed_bench(const Case& c, const fs::path& bench_file) {
   return Composer(c, bench_file).text();
+}
+
+std::string linked_bench(const Case& c, const fs::path& composed) {
+  return Composer(c, composed).linked_text();
+}
+
+std::vector<ComposedMessage> composed_messages(const Case& c, const fs::path& composed) {
+  return Composer(c, composed).messages();
+}
+
+void remove_places(ConfigNode& bench) {
+  for (const std::string_view table : kTablesOfAPlace)
+    remove(bench, table);
 }
 
 }  // namespace drivebench::regression

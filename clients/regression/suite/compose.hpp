@@ -4,12 +4,13 @@
 #include <filesystem>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "clients/regression/suite/case.hpp"
 
 namespace drivebench::regression {
 
-/// The tables of a bench file that belong to a place: a composed bench has none of them.
+/// The tables of a bench file that belong to a place: those of a composed bench are from its case.
 inline constexpr auto kTablesOfAPlace =
     std::to_array<std::string_view>({"can", "modbus", "tls", "audit", "experiments", "tcp"});
 
@@ -18,5 +19,20 @@ inline constexpr auto kTablesOfAPlace =
 /// bus that the device under test asks for. CSV
 /// files of curves are named by their absolute paths. Throws ConfigError with all problems.
 std::string composed_bench(const Case& c, const std::filesystem::path& bench_file);
+
+/// A composed bench of which remove_places() has taken the bus of its case, with that bus.
+std::string linked_bench(const Case& c, const std::filesystem::path& composed);
+
+/// A message to the device under test for `drivebench-server --messages`, and its line in the case file.
+struct ComposedMessage {
+  int line;
+  std::string text;  ///< a [[message]] table
+};
+
+/// The steps of a case that are messages, on its composed bench.
+std::vector<ComposedMessage> composed_messages(const Case& c, const std::filesystem::path& composed);
+
+/// Takes all tables of a place out of a bench.
+void remove_places(ConfigNode& bench);
 
 }  // namespace drivebench::regression

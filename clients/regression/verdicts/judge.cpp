@@ -17,6 +17,8 @@ constexpr std::array<std::uint64_t, 4> kSeeds = {0x9e3779b97f4a7c15, 0xbf58476d1
                                                  0xd6e8feb86659fd93};
 constexpr std::uint64_t kMultiplier = 0x2545f4914f6cdd1d;
 
+constexpr std::uint64_t kRun = 1;  // a state of an axis
+
 constexpr std::uint64_t mixed(std::uint64_t hash, std::uint64_t word) noexcept {
   return (std::rotl(hash, 29) ^ word) * kMultiplier;
 }
@@ -63,6 +65,8 @@ void check_on_bench(const Case& c, const RunFacts& facts, ProblemList& problems)
     need_axis(check.axis, check.line, "check.axis");
     need_axis_of(check.after, check.line, "check.after");
     need_axis_of(check.condition, check.line, "check.condition");
+    for (const std::string& axis : check.formula ? check.formula->axes() : std::vector<std::string>())
+      need_axis(axis, check.line, "check.formula");
     const std::string rule = problem_on_bench(check, facts);
     if (!rule.empty()) problems.add(c.file, check.line, "check", rule);
   }
@@ -75,6 +79,7 @@ Judge::Judge(const Case& c, const RunFacts& facts, bool keeps_trace)
       device_axis_(find_axis(facts, c.device.axis)),
       keeps_trace_(keeps_trace),
       lanes_(kSeeds) {
+  if (c.device.kind != DeviceUnderTest::Kind::kAttached) begin_tick_ = 0;
   for (const CheckSpec& spec : c.checks) {
     const std::size_t axis = find_axis(facts, spec.axis);
     CheckSpec named = spec;
@@ -88,7 +93,7 @@ Judge::Judge(const Case& c, const RunFacts& facts, bool keeps_trace)
     };
     if (signal == nullptr || std::ranges::any_of(trace_.columns, is_kept)) continue;
     trace_.columns.push_back({.axis = facts.axes[axis], .signal = signal, .values = {}});
-    trace_axes_.push_back(axis);
+    traced_.emplace_back(*signal, spec.formula, facts, axis);
   }
   for (const Step& step : c.steps) {
     if (!step.when) continue;
@@ -101,8 +106,23 @@ Judge::Judge(const Case& c, const RunFacts& facts, bool keeps_trace)
 
 void Judge::see(std::span<const Sample> axes) {
   const Sample& device = axes[device_axis_];
-  if (device.tick > end_tick_) return;
-  constexpr std::uint64_t kRun = 1;
+  if (!begin_tick_) {
+    if (device.state != kRun) return watch_steps(axes);
+    begin_tick_ = device.tick;
+    late_before_ = device.late_ticks;
+  }
+  if (is_over(device.tick)) return;
+  if (case_.device.kind != DeviceUnderTest::Kind::kAttached) return see_case(axes);
+  shifted_.assign(axes.begin(), axes.end());
+  for (Sample& sample : shifted_) {
+    sample.tick -= *begin_tick_;
+    sample.late_ticks -= late_before_;
+  }
+  see_case(shifted_);
+}
+
+void Judge::see_case(std::span<const Sample> axes) {
+  const Sample& device = axes[device_axis_];
   was_armed_ = was_armed_ || device.state == kRun;
   last_tick_ = device.tick;
   late_ticks_ = device.late_ticks;
@@ -142,7 +162,7 @@ void Judge::add_hash(const Sample& sample) noexcept {
 void Judge::keep(std::span<const Sample> axes) {
   trace_.time_s.push_back(static_cast<double>(axes[device_axis_].tick) * period_s_);
   for (std::size_t i = 0; i < trace_.columns.size(); ++i)
-    trace_.columns[i].values.push_back(value_of(*trace_.columns[i].signal, axes[trace_axes_[i]]));
+    trace_.columns[i].values.push_back(traced_[i].of(axes));
 }
 
 CaseResult Judge::failure(Verdict verdict, std::string reason) const {

@@ -39,6 +39,7 @@ struct CaseResult {
   std::uint64_t hash = 0;     ///< of all samples: equal hashes mean equal runs
   double wall_s = 0.0;
   std::string output{};                          ///< what the device under test printed, its end
+  std::vector<std::string> messages{};           ///< that the device under test was sent, with their times
   Trace trace{};                                 ///< empty once the plots are drawn
   std::vector<std::string> plots{};              ///< of failed checks, as SVG
   std::shared_ptr<const DeviceTiming> timing{};  ///< if it was measured; in no report but its own

@@ -32,6 +32,8 @@ class Endpoint {
   void serve(Engine& engine, Audit* audit = nullptr);
   TransportReport report() const;
   std::string name() const { return bus_->name(); }
+  /// Puts a frame of a [[message]] on the bus. Returns why it cannot; empty: it has.
+  std::string send_frame(const Frame& frame);
   /// Sends that it stops, and nothing afterwards. The engine takes the leases back.
   void close();
 

@@ -17,6 +17,14 @@ void Endpoint::put(const Frame& frame) {
   }
 }
 
+std::string Endpoint::send_frame(const Frame& frame) {
+  const BusState state = bus_->status().state;
+  if (closed_ || state == BusState::kAbsent || state == BusState::kDown)
+    return "the bus is " + std::string(name_of(state));
+  bus_->send(frame);
+  return {};
+}
+
 void Endpoint::send(Message message, const Node& node, std::span<const double> values) {
   const MessageRow* const row = find_message(message, config_.profile.fd, node.wide());
   put(node, encode(*row, config_.profile, node.id, values));

@@ -28,6 +28,7 @@ constexpr std::string_view kAllChecks =
     "[[check]]\nkind = \"bounds\"\nsignal = \"i_a_a\"\nabs = 16.0\n"
     "[[check]]\nkind = \"rms\"\nsignal = \"i_b_a\"\nmax = 16.0\n"
     "[[check]]\nkind = \"ripple\"\nsignal = \"speed_rad_s\"\nmax = 500.0\n"
+    "[[check]]\nkind = \"energy\"\nformula = \"u_a_v*i_a_a + u_b_v*i_b_a\"\nmax = 1e6\n"
     "[[check]]\nkind = \"steady_state\"\nsignal = \"speed_rad_s\"\nvalue = 0.0\nmax_error = 50.0\n"
     "[[check]]\nkind = \"settles\"\nsignal = \"angle_rad\"\nvalue = 3.14159\nband = 0.05\nwithin_s = 1.0\n"
     "[[check]]\nkind = \"overshoot\"\nsignal = \"angle_rad\"\nvalue = 3.14159\nmax_percent = 50.0\n"

@@ -64,6 +64,7 @@ with drivebench.Bench(os.environ["DRIVEBENCH_LINK"]) as bench:
 # Defects of a controller: the case of the suite `reference`, what is wrong, and the check that tells it.
 DEFECTS = (
     ("induction/move", "counts backwards", with_fault("encoder_swapped", 1), "arrives"),
+    ("induction/move", "the other sign of each current", with_fault("current_sensor_gain", -1.0), "moves as planned"),
     ("induction/move", "half of each current is missing", with_fault("current_sensor_gain", 0.5), "moves as planned"),
     ("induction/move", "a weak position loop", with_gain("position.proportional_per_s2", 20000.0), "arrives"),
     ("induction/move", "differences in the place of an observer", with_text("book/8.2.2", "book/8.2.2-clipped-backward-difference"),
@@ -118,6 +119,36 @@ override.axis.servo.machine.rotor_resistance_ohm = [3.9, 5.85]
             reports.append((out, *(name.read_bytes() for name in names)))
         self.assertEqual(reports[0], reports[1])
         self.assertEqual(len(xml.etree.ElementTree.fromstring(reports[0][2]).findall("./testsuite/testcase")), 6)
+
+    def test_a_loaded_machine_gives_the_same_bytes(self):
+        """Catches: a result in lockstep that depends on how fast the machine is: a time limit that counts its time, a sample that is left out."""
+        self.write("device.py", DRIVES.format(until=10 ** 9))
+        self.write("program.toml", PROGRAM.format(limit_s=120) + "[matrix]\nseed = [1, 2]\n")
+        self.write("servo.toml", SERVO)
+        quiet = self.reports("--jobs", 2)
+        burners = [subprocess.Popen([sys.executable, "-c", "while True: pass"]) for _ in range(4)]
+        try:
+            loaded = self.reports("--jobs", 2)
+        finally:
+            for burner in burners:
+                burner.kill()
+                burner.wait()
+        self.assertEqual(quiet, loaded)
+
+    def test_a_tube_lies_around_the_run_of_a_reference_controller(self):
+        """Catches: a reference that runs on another bench or without the steps, a preset that is told only when the case runs."""
+        step = "[[step]]\nat_s = 0.05\nload_nm = 0.05\n"
+        tube = '[[check]]\nname = "as the book"\nkind = "tube"\nsignal = "i_a_a"\nreference = "{}"\nabs = {}\n'
+        self.write("servo.toml", SERVO + step + tube.format("book/8.2.2", 0.0))
+        self.suite()
+        self.write("servo.toml", SERVO.replace("[[check]]", '[dut.gains]\n"position.proportional_per_s2" = 20000.0\n[[check]]', 1) + step
+                   + tube.format("book/8.2.2", 0.05))
+        (failed,) = [check for check in self.suite(code=FAILED)["cases"][0]["checks"] if not check["passed"]]
+        self.assertEqual(failed["name"], "as the book")
+        for reference, why in (("book/none", "book/none"), ("exercise/9.9", "which does not fit the bench")):
+            self.write("servo.toml", SERVO + tube.format(reference, 0.1))
+            done = self.run_test(self.folder / "suite", code=USAGE)
+            self.assertRegex(done.stderr, f"check.reference.*{why}")
 
     def reports(self, *arguments, code=OK):
         """The bytes of all reports."""

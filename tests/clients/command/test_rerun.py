@@ -112,6 +112,14 @@ load_profile = "load.csv"
         self.assertRegex(said, r"(?m)^pass +case")
         self.assertRegex(said, r"differs first at tick \d+: ")
 
+    def test_a_bundle_brings_the_bus_of_its_program(self):
+        """Catches: a bundle that the next program refuses because its bench has a bus."""
+        for link in ("can", "modbus"):
+            case = PROGRAM.format(limit_s=30).replace("[dut]", f'[dut]\nlink = "{link}"').replace("i_a_a < 30", "i_a_a < 0")
+            bundle = self.failed_bundle(link, case, device_py=DRIVES.format(until=10 ** 9))
+            self.assertIn("the same to the bit: 201 samples", self.rerun(bundle, code=FAILED), link)
+            bundle.unlink()
+
     def test_a_program_begins_in_the_middle_of_the_recorded_run(self):
         """Catches: a bench that is not where the recorded one was, a condition that is forgotten, a lease that is still held."""
         bundle = self.failed_bundle("case", PROGRAM.format(limit_s=30).replace("i_a_a < 30", "i_a_a < 0.5") + """[[step]]

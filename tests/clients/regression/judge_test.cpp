@@ -73,6 +73,30 @@ TEST(Judge, LateTicksInRealTimeMakeTheRunInvalid) {
   EXPECT_EQ(run(c, 1, 3, 0).verdict, Verdict::kPass);
 }
 
+// Catches: a case with an attached drive whose time, late ticks or end are those of the bench.
+TEST(Judge, TheTimeOfAnAttachedDriveBeginsWhenItArms) {
+  Case c = case_with(5.0);
+  c.device.kind = DeviceUnderTest::Kind::kAttached;
+  c.is_realtime = true;
+  Judge judge(c, kTwoAxes, false);
+  for (std::uint64_t tick = 0; tick < 50; ++tick) {
+    std::vector<Sample> axes(2);
+    for (Sample& sample : axes) {
+      sample.tick = tick;
+      sample.state = tick < 20 ? 5 : 1;
+      sample.late_ticks = 3;  // all of them before
+    }
+    axes[1].speed_rad_s = tick < 20 || tick > 30 ? 50.0 : 5.0;
+    EXPECT_EQ(judge.begin_tick().has_value(), tick > 20) << tick;
+    EXPECT_EQ(judge.is_over(tick), tick > 30) << tick;
+    judge.see(axes);
+  }
+  const CaseResult result = judge.result();
+  EXPECT_EQ(result.verdict, Verdict::kPass) << result.reason;
+  EXPECT_EQ(result.samples, 22U);
+  EXPECT_EQ(result.bench_s, 0.010);
+}
+
 // Catches: a stimulus that never came, one that needs its condition for one tick less or more, one after the
 // end.
 TEST(Judge, AStepThatNeverActedFailsTheCase) {

@@ -53,6 +53,10 @@ bool prepare_child(const ProcessSettings& settings, int output) noexcept {
     error = ::open(settings.error_file.c_str(), O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC, 0600);
     if (error < 0 || ::dup2(error, STDERR_FILENO) < 0) return false;
   }
+  if (!settings.input_file.empty()) {
+    const int input = ::open(settings.input_file.c_str(), O_RDONLY | O_CLOEXEC);
+    if (input < 0 || ::dup2(input, STDIN_FILENO) < 0) return false;
+  }
   return ::dup2(settings.joins_output ? error : output, STDOUT_FILENO) >= 0;
 }
 

@@ -17,6 +17,7 @@ struct ProcessSettings {
   std::vector<std::string> environment{};  ///< NAME=VALUE, in the place of the parent's
   std::string folder{};                    ///< where it starts; empty: here
   std::string error_file{};                ///< takes its standard error; empty: that of the parent
+  std::string input_file{};                ///< its standard input; empty: that of the parent
   bool joins_output = false;               ///< its standard output goes to that file, too
   bool own_group = false;                  ///< it gets its signals together with its own children
 };

@@ -5,6 +5,7 @@
 
 #include "clients/command/common/basics/errors.hpp"
 #include "clients/command/common/session/session.hpp"
+#include "clients/link/tcp/tcp_axis.hpp"
 
 namespace drivebench::command {
 namespace {
@@ -17,6 +18,7 @@ void describe_axis(const drivebench_axis& from, v1::AxisDescription& to) {
   to.set_drive_kind(from.drive_kind);
   to.set_phases(from.phases);
   to.set_field_winding(from.field_winding != 0);
+  to.set_shares_amplifier_with(from.shares_amplifier_with);
   for (const drivebench_parameter& row : std::span(from.parameters, from.parameter_count)) {
     v1::ParameterDescription& parameter = *to.add_parameters();
     parameter.set_name(row.name);
@@ -68,6 +70,7 @@ InprocAxis::InprocAxis(const std::string& bench, std::string_view axis)
     : bench_(open_bench(bench)),
       description_(description_of(bench_.describe())),
       axis_(axis_number(description_, axis)),
+      second_axis_(link::sharer_of_amplifier(description_, axis_)),
       samples_(static_cast<std::size_t>(description_.axes_size())) {}
 
 /// Turns the errors of the ABI into those of a link.
@@ -95,6 +98,7 @@ void InprocAxis::clear_faults() {
 
 const Sample& InprocAxis::newest() {
   request([this] { samples_[axis_] = std::bit_cast<Sample>(bench_.newest(axis_)); });
+  read_second();
   return samples_[axis_];
 }
 
@@ -110,7 +114,13 @@ const Sample& InprocAxis::exchange(const link::AxisCommand& command) {
                              .legs_off = command.legs_off,
                              .edges = {}};
   request([&] { samples_[axis_] = std::bit_cast<Sample>(bench_.step(ours)); });
+  read_second();
   return samples_[axis_];
+}
+
+void InprocAxis::read_second() {
+  if (!second_axis_) return;
+  request([this] { samples_[*second_axis_] = std::bit_cast<Sample>(bench_.newest(*second_axis_)); });
 }
 
 void InprocAxis::write_parameter(std::string_view name, double value) {

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -26,6 +27,7 @@ class InprocAxis final : public link::AxisLink {
   void release() override;
   void clear_faults() override;
   const Sample& newest() override;
+  const Sample* second() const noexcept override { return second_axis_ ? &samples_[*second_axis_] : nullptr; }
   const Sample& exchange(const link::AxisCommand& command) override;
   void write_parameter(std::string_view name, double value) override;
   bool can_set_load() const noexcept override { return true; }
@@ -37,10 +39,12 @@ class InprocAxis final : public link::AxisLink {
  private:
   template <class Request>
   void request(Request what);
+  void read_second();
 
   client::Bench bench_;
   v1::BenchDescription description_;
   std::uint32_t axis_ = 0;
+  std::optional<std::uint32_t> second_axis_;  ///< on the same amplifier
   std::vector<Sample> samples_;
 };
 

@@ -9,11 +9,12 @@
 /// A bundle: a ZIP file with everything that a case needs to run again.
 ///
 ///     bundle.toml        format, the program that wrote it, the name of the case, its verdict and the hash
-///     bench.toml         the composed bench; curves/ has its CSV files
+///     bench.toml         the composed bench without the bus of its case; curves/ has its CSV files
 ///     case/case.toml     the case with the values of its matrix and draws; beside it the files of its device
 ///                        under test and its golden runs
 ///     run.mcap           the recording: inputs, commands and samples
 ///     output.txt         what the device under test printed, its end
+///     messages.txt       what it was told, if anything
 namespace drivebench::command {
 
 /// The file of the case in a folder of bundles.
@@ -34,7 +35,7 @@ void write_bundle(const std::filesystem::path& file, const BundleContent& conten
 /// A bundle in a folder.
 struct Unpacked {
   regression::Case what;
-  std::filesystem::path bench_file;
+  std::filesystem::path bench_file;  ///< with the bus of the case
   std::filesystem::path recording;
   std::string program;  ///< that wrote it
 };

@@ -18,7 +18,7 @@ namespace fs = std::filesystem;
 using regression::KeyTable;
 
 constexpr auto kParts =
-    std::to_array<std::string_view>({"bundle.toml", "bench.toml", "run.mcap", "output.txt"});
+    std::to_array<std::string_view>({"bundle.toml", "bench.toml", "run.mcap", "output.txt", "messages.txt"});
 constexpr auto kNeeded = std::to_array<std::string_view>({"bundle.toml", "bench.toml", "case/case.toml"});
 
 [[noreturn]] void refuse(const fs::path& file, std::string_view entry, const std::string& rule) {
@@ -107,6 +107,7 @@ Unpacked read(const fs::path& file, const fs::path& folder) {
   if (cases.size() != 1)
     refuse(file, "case/case.toml", fmt::format("makes {} cases but a bundle has one", cases.size()));
   cases.front().name = facts.name;
+  write_file(folder / "bench.toml", regression::linked_bench(cases.front(), folder / "bench.toml"));
   return {.what = std::move(cases.front()),
           .bench_file = folder / "bench.toml",
           .recording = folder / "run.mcap",

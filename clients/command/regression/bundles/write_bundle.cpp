@@ -1,4 +1,4 @@
-#include <fmt/core.h>
+#include <fmt/format.h>
 
 #include <algorithm>
 #include <fstream>
@@ -10,6 +10,7 @@
 #include "clients/command/regression/bundles/bundle.hpp"
 #include "clients/regression/results/fingerprints.hpp"
 #include "clients/regression/suite/case_file.hpp"
+#include "clients/regression/suite/compose.hpp"
 #include "clients/regression/tables/key_table.hpp"
 #include "clients/regression/tables/toml_text.hpp"
 
@@ -51,6 +52,7 @@ void add_bench(const BundleContent& content, Entries& entries) {
   const std::string text = bytes_of(content.bench_file);
   std::optional<ConfigNode> bench = parse_document(text, content.bench_file.string(), problems);
   problems.throw_if_any();
+  regression::remove_places(*bench);
   std::size_t curves = 0;
   take_files(*bench, content.bench_file.parent_path(), "curves/", curves, entries, "");
   entries["bench.toml"] = regression::toml_text(*bench);
@@ -104,6 +106,8 @@ void write_bundle(const fs::path& file, const BundleContent& content) {
   add_case(content.what, entries);
   entries["bundle.toml"] = facts_text(content);
   entries["output.txt"] = content.result.output;
+  if (!content.result.messages.empty())
+    entries["messages.txt"] = fmt::format("{}\n", fmt::join(content.result.messages, "\n"));
   std::error_code none;
   if (fs::exists(content.recording, none)) entries["run.mcap"] = bytes_of(content.recording);
   std::vector<archive::Entry> list;

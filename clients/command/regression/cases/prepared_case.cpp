@@ -9,6 +9,8 @@
 #include "clients/command/common/programs/composed_file.hpp"
 #include "clients/command/common/programs/installation.hpp"
 #include "clients/command/control/control_presets.hpp"
+#include "clients/command/regression/cases/check_messages.hpp"
+#include "clients/command/regression/cases/reference_run.hpp"
 #include "clients/regression/suite/compose.hpp"
 
 namespace drivebench::command {
@@ -52,10 +54,17 @@ PreparedCase prepare_one(const Case& c, const fs::path& file, ProblemList& probl
   const fs::path bench = bench_file_of(c);
   write_file(file, fmt::format("# {}: {} of {}\n{}", bench.filename().string(), c.name,
                                fs::path(c.file).filename().string(), regression::composed_bench(c, bench)));
+  check_messages(c, file, problems);
   return prepared_on(c, file, problems);
 }
 
 }  // namespace
+
+std::string misfit(const Case& c, const fs::path& bench) {
+  const InprocAxis axis(bench.string(), c.device.axis);
+  const control::Preset& preset = chosen_preset(c.device.preset);
+  return misfit(c, axis, preset, made(preset, gains_of(c.device)));
+}
 
 fs::path bench_file_of(const Case& c) {
   std::error_code ignored;
@@ -85,6 +94,7 @@ PreparedCase prepared_on(const Case& c, const fs::path& bench, ProblemList& prob
   prepared.facts.end_tick =
       end_tick_of(c, axis.bench().period_s(), axis.bench().arming_commands(), run ? &*run : nullptr);
   regression::check_on_bench(c, prepared.facts, problems);
+  check_references(prepared, problems);
   return prepared;
 }
 

@@ -25,9 +25,13 @@ std::filesystem::path bench_file_of(const regression::Case& c);
 /// The gains of a preset, as control takes them.
 std::vector<control::Gain> gains_of(const regression::DeviceUnderTest& device);
 
-/// A case on a bench that is composed already. What does not fit goes to the list.
+/// A case on a bench that is composed already, with its link. What does not fit goes to the list.
 PreparedCase prepared_on(const regression::Case& c, const std::filesystem::path& bench,
                          ProblemList& problems);
+
+/// The reason why the preset of a case cannot run on a composed bench; empty: it can. Throws UsageError if
+/// there is no such preset.
+std::string misfit(const regression::Case& c, const std::filesystem::path& bench);
 
 /// The text of a composed bench in lockstep, with the delay and the arming that it has in real time.
 std::string in_lockstep(const std::filesystem::path& composed, regression::DeviceUnderTest::Link link);

@@ -12,6 +12,7 @@
 #include "clients/command/common/session/session.hpp"
 #include "clients/command/control/control_loop.hpp"
 #include "clients/command/control/control_presets.hpp"
+#include "clients/command/regression/cases/reference_run.hpp"
 #include "clients/command/regression/cases/repeated_axis.hpp"
 
 namespace drivebench::command {
@@ -90,7 +91,7 @@ CaseResult run_in_process(const PreparedCase& prepared, const RunWishes& wishes,
     if (timing) timing->missed.see(axis.all()[place]);
   };
   drive(axis, c, see,
-        {.end_tick = judge.end_tick(),
+        {.end_tick = prepared.facts.end_tick,
          .repeats = wishes.repeats,
          .computing = timing ? &timing->answers.after_sample : nullptr});
   CaseResult result = judge.result();
@@ -99,15 +100,18 @@ CaseResult run_in_process(const PreparedCase& prepared, const RunWishes& wishes,
   return result;
 }
 
-CaseResult judged(const PreparedCase& prepared, const std::filesystem::path& folder,
-                  const RunWishes& wishes) {
+CaseResult judged(const PreparedCase& wanted, const std::filesystem::path& folder, const RunWishes& wishes) {
+  if (!wanted.what->skip.empty()) return skipped(*wanted.what);
+  const ReferencedCase referenced(wanted);
+  const PreparedCase& prepared = referenced.prepared();
   const Case& c = *prepared.what;
-  if (!c.skip.empty()) return skipped(c);
   Judge judge(c, prepared.facts, wishes.trace);
   try {
     end_if_interrupted();
     if (c.device.kind == DeviceUnderTest::Kind::kProgram)
       return run_program_case(prepared, folder, wishes, judge);
+    if (c.device.kind == DeviceUnderTest::Kind::kAttached)
+      return run_attached_case(prepared, folder, wishes, judge);
     return run_in_process(prepared, wishes, judge);
   } catch (const std::exception& error) {
     return judge.failure(Verdict::kError, error.what());

@@ -46,6 +46,11 @@ void drive(link::AxisLink& bench, const regression::Case& c, const SeeTick& see,
 regression::CaseResult run_program_case(const PreparedCase& prepared, const std::filesystem::path& folder,
                                         const RunWishes& wishes, regression::Judge& judge);
 
+/// The case of a drive that runs already: serves the bench in real time where the drive waits for it, until
+/// the drive arms and the case is over, and leaves the drive as it is.
+regression::CaseResult run_attached_case(const PreparedCase& prepared, const std::filesystem::path& folder,
+                                         const RunWishes& wishes, regression::Judge& judge);
+
 /// Throws std::runtime_error once the user has interrupted what runs.
 void end_if_interrupted();
 

@@ -16,8 +16,9 @@
 #include "clients/command/common/programs/server_ready.hpp"
 #include "clients/command/common/programs/temporary_folder.hpp"
 #include "clients/command/common/session/session.hpp"
-#include "clients/command/recording/recorded_samples.hpp"
-#include "clients/command/regression/cases/server_answers.hpp"
+#include "clients/command/regression/cases/recorded_server.hpp"
+#include "clients/command/regression/cases/reference_run.hpp"
+#include "clients/command/regression/cases/server_report.hpp"
 #include "clients/regression/checks/check_kinds.hpp"
 
 namespace drivebench::command {
@@ -27,18 +28,6 @@ using namespace std::chrono_literals;
 
 constexpr auto kServerFarewell = 20s;
 constexpr auto kLook = 100ms;
-
-/// Shows the samples of a recording, a tick at a time, while `see` wants more.
-template <class See>
-void see_recording(const std::filesystem::path& file, const regression::RunFacts& facts, See see) {
-  RecordedSamples recorded(file, facts.axes);
-  std::vector<Sample> samples(facts.axes.size());
-  while (const auto row = recorded.next()) {
-    end_if_interrupted();
-    samples[row->axis] = row->sample;
-    if (row->axis + 1 == samples.size() && !see(samples)) return;
-  }
-}
 
 /// The first tick after which one of the checks has failed, which all do at a sample.
 std::uint64_t first_failure(const PreparedCase& prepared, const std::filesystem::path& file) {
@@ -70,11 +59,13 @@ void print_latched(const std::string& address) {
 
 }  // namespace
 
-JudgedRecording judged_recording(const PreparedCase& prepared, const std::filesystem::path& file) {
+JudgedRecording judged_recording(const PreparedCase& recorded, const std::filesystem::path& file) {
+  const ReferencedCase referenced(recorded);
+  const PreparedCase& prepared = referenced.prepared();
   regression::Judge judge(*prepared.what, prepared.facts, false);
   JudgedRecording run;
   see_recording(file, prepared.facts, [&](const std::vector<Sample>& samples) {
-    if (samples[0].tick > judge.end_tick()) return false;
+    if (judge.is_over(samples[0].tick)) return false;
     judge.see(samples);
     run.last_tick = samples[0].tick;
     return true;
@@ -90,7 +81,7 @@ JudgedRecording judged_recording(const PreparedCase& prepared, const std::filesy
       at_once.checks.push_back(prepared.what->checks[i]);
     } else if (std::isfinite(finding.at_s)) {
       const auto tick = static_cast<std::uint64_t>(std::llround(finding.at_s / prepared.facts.period_s));
-      run.failure_tick = std::min(run.failure_tick, tick);
+      run.failure_tick = std::min(run.failure_tick, judge.begin_tick().value_or(0) + tick);
     }
   }
   if (!at_once.checks.empty()) {

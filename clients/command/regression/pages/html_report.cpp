@@ -1,6 +1,6 @@
 #include "clients/command/regression/pages/html_report.hpp"
 
-#include <fmt/core.h>
+#include <fmt/format.h>
 
 #include <algorithm>
 #include <cmath>
@@ -91,6 +91,10 @@ std::string section_of(const CaseResult& result, const std::string& link) {
   for (const std::string& plot : result.plots)
     html += plot;
   html += checks_table(result);
+  if (!result.messages.empty()) {
+    html += fmt::format("<p>What the device under test was told:</p>\n<pre>{}</pre>\n",
+                        markup(fmt::format("{}", fmt::join(result.messages, "\n"))));
+  }
   if (!result.output.empty()) {
     html += fmt::format("<p>What the device under test printed, its end:</p>\n<pre>{}</pre>\n",
                         markup(result.output));

@@ -72,7 +72,7 @@ class Parameter:
 @dataclasses.dataclass(frozen=True)
 class Axis:
     """An emulated drive train. `phases` counts the terminals a, b, c (0: a field bus does not tell); a machine with a field
-    winding has another one."""
+    winding has another one. `shares_amplifier_with`: the axis whose amplifier drives this machine, too; "": none."""
 
     name: str
     machine: str
@@ -82,6 +82,7 @@ class Axis:
     phases: int
     field_winding: bool
     parameters: dict[str, Parameter]
+    shares_amplifier_with: str
 
 
 @dataclasses.dataclass(frozen=True)
@@ -149,7 +150,7 @@ def _axis(row: AxisStruct) -> Axis:
     parameters = [Parameter(text(p.name), text(p.unit), text(p.meaning), p.minimum, p.maximum, p.value, bool(p.integer),
                             bool(p.live)) for p in row.parameters[:row.parameter_count]]
     return Axis(text(row.name), text(row.machine), text(row.machine_kind), text(row.connection), text(row.drive_kind),
-                row.phases, bool(row.field_winding), {each.name: each for each in parameters})
+                row.phases, bool(row.field_winding), {each.name: each for each in parameters}, text(row.shares_amplifier_with))
 
 
 def description_of(d: DescriptionStruct) -> Description:

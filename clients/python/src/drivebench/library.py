@@ -45,7 +45,7 @@ class AxisStruct(ctypes.Structure):
     _fields_ = [("name", ctypes.c_char_p), ("machine", ctypes.c_char_p), ("machine_kind", ctypes.c_char_p),
                 ("connection", ctypes.c_char_p), ("drive_kind", ctypes.c_char_p), ("phases", ctypes.c_uint32),
                 ("field_winding", ctypes.c_int32), ("parameter_count", ctypes.c_size_t),
-                ("parameters", ctypes.POINTER(ParameterStruct))]
+                ("parameters", ctypes.POINTER(ParameterStruct)), ("shares_amplifier_with", ctypes.c_char_p)]
 
 
 class FaultStruct(ctypes.Structure):

@@ -1,7 +1,9 @@
 #pragma once
 
 #include <chrono>
+#include <cstdint>
 #include <optional>
+#include <string>
 #include <string_view>
 #include <vector>
 
@@ -11,9 +13,21 @@
 
 namespace drivebench::command {
 
-/// When the commands for each axis came, from the verdict that drivebench-server prints with --json and
-/// --measure-answers; nothing for any other line.
-std::optional<std::vector<AnswerTimes>> parse_answers(std::string_view line);
+/// A message to the device under test, as the server reports it.
+struct SentMessage {
+  std::uint64_t tick = 0;  ///< whose sample it preceded
+  std::string text{};
+  std::string problem{};  ///< why it did not arrive; empty: nothing is known against it
+};
+
+/// What the verdict of a server has beside the run.
+struct ServerReport {
+  std::vector<AnswerTimes> answers{};  ///< when the commands for each axis came; empty: it was not measured
+  std::vector<SentMessage> messages{};
+};
+
+/// Reads the verdict that drivebench-server prints with --json; nothing for any other line.
+std::optional<ServerReport> parse_report(std::string_view line);
 
 /// A server that repeats or replays a long recording says nothing before its end.
 constexpr auto kRepetitionPatience = std::chrono::hours(24);
