@@ -42,6 +42,7 @@ AxisCore core_of(const AxisParameters& p, AxisTiming timing, std::uint64_t seed,
               SensorBank(p.sensors, connection, timing.period_s, seed, noise,
                          timing.period_s / timing.substeps, kind_of(p.machine).field != FieldSupply::kNone),
           .comparators = Comparators(p.sensors.comparator, timing.period_s, seed, noise + kComparatorNoise),
+          .shunts = Shunts(p.sensors.shunts, timing.period_s),
           .encoder = Encoder(p.encoder, timing.period_s),
           .shaft = constants_of(p.mechanics),
           .shaft_has_events = shaft_has_events(p.mechanics)};
@@ -113,6 +114,7 @@ void Axis::set_parameters(const AxisParameters& p) noexcept {
   core_.drive.set_parameters(p.drive);
   core_.sensors.set_parameters(p.sensors);
   core_.comparators.set_parameters(p.sensors.comparator);
+  core_.shunts = Shunts(p.sensors.shunts, core_.timing.period_s);
   core_.shaft = constants_of(p.mechanics);
   core_.shaft_has_events = shaft_has_events(p.mechanics);
   adjust();
@@ -167,10 +169,20 @@ void Axis::begin_tick(const PhaseCommand& command, Tick tick) noexcept {
   core_.last_tick_turn = state_.turns;
   core_.last_tick_encoder = state_.encoder;
   core_.drive.begin_tick(state_.drive, command, state_.injected, tick);
-  if ((state_.faults & kOverCurrentTrip) != 0) core_.drive.switch_off(state_.drive);
+  if ((state_.faults & kGatesOffFaults) != 0) core_.drive.switch_off(state_.drive);
+  begin_break();
   if (core_.p.sensors.terminals) state_.terminal_mean_v = {};
   core_.follows = core_.drive.follows() || core_.sensors.follows() || core_.p.thermal.enabled ||
-                  core_.p.sensors.follow_terminals() || has_impedance(core_.p.drive);
+                  core_.p.sensors.follow_terminals() || has_impedance(core_.p.drive) || core_.breaks ||
+                  core_.shunts.used() || has_switch_losses(core_.p.drive);
+}
+
+void Axis::begin_break() noexcept {
+  BreakMemory& m = state_.break_input;
+  if (m.pending != 0) m.due_s -= core_.timing.period_s;
+  const bool line = state_.injected.gate_driver_fault != 0.0 && (state_.faults & kBreakInput) == 0;
+  if (line && m.pending == 0) pull_break(core_, state_, 0.0);
+  core_.breaks = m.pending != 0 || watches_break(core_, state_);
 }
 
 double Axis::load_at(Tick tick) const noexcept {
@@ -190,6 +202,13 @@ void Axis::hold(const MotionState& before) noexcept {
   look_inside();
 }
 
+PhaseValues Axis::sensed_currents() const noexcept {
+  PhaseValues i = terminal_currents(core_.connection, truth_.current_a, state_.open_terminals);
+  if (!core_.shunts.used()) return i;
+  const std::array<double, 3>& held_a = state_.shunts.held_a;
+  return {.a = held_a[0], .b = held_a[1], .c = held_a[2], .field = i.field};
+}
+
 void Axis::end_tick(const MotionState& before, Tick tick) noexcept {
   if (!finite()) return hold(before);
   if (state_.drive.saturated != 0.0) state_.faults |= kVoltageSaturated;
@@ -204,16 +223,15 @@ void Axis::end_tick(const MotionState& before, Tick tick) noexcept {
   } else {
     look_inside();
   }
-  core_.sensors.end_tick(
-      state_.sensors,
-      {.current_a = terminal_currents(core_.connection, truth_.current_a, state_.open_terminals),
-       .voltage_v = state_.voltage_v,
-       .bus_v = state_.drive.bus_v,
-       .neutral_v = state_.neutral_v,
-       .temperature_k = state_.thermal.temperature_k,
-       .angle_rad = state_.shaft.angle_rad,
-       .speed_rad_s = state_.shaft.speed_rad_s},
-      tick + 1);
+  core_.sensors.end_tick(state_.sensors,
+                         {.current_a = sensed_currents(),
+                          .voltage_v = state_.voltage_v,
+                          .bus_v = state_.drive.bus_v,
+                          .neutral_v = state_.neutral_v,
+                          .temperature_k = state_.thermal.temperature_k,
+                          .angle_rad = state_.shaft.angle_rad,
+                          .speed_rad_s = state_.shaft.speed_rad_s},
+                         tick + 1);
 }
 
 void Axis::advance(const PhaseCommand& command, Tick tick) noexcept {

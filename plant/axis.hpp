@@ -84,7 +84,11 @@ class Axis {
                        const MotionState& second_before, Tick tick) noexcept;
   MotionState motion() const noexcept { return {.machine = state_.machine, .shaft = state_.shaft}; }
   void begin_tick(const PhaseCommand& command, Tick tick) noexcept;
+  /// The break input at the start of a tick: the fault line, and what the tick before has left.
+  void begin_break() noexcept;
   void end_tick(const MotionState& before, Tick tick) noexcept;
+  /// The currents that the sensors convert.
+  PhaseValues sensed_currents() const noexcept;
   void hold(const MotionState& before) noexcept;
   double load_at(Tick tick) const noexcept;
   void adjust() noexcept;

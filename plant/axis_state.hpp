@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 
+#include "plant/drive/break_input.hpp"
 #include "plant/drive/drive.hpp"
 #include "plant/drive/terminals.hpp"
 #include "plant/injected_faults.hpp"
@@ -49,6 +50,9 @@ struct AxisState {
   ThreePhase terminal_mean_v{};  ///< over that tick; within a tick what its pieces have brought so far
   // Later still, and zero without comparators.
   ComparatorMemory comparators{};
+  // Later still, and zero without a break input and with currents that are measured in the wires.
+  BreakMemory break_input{};
+  ShuntMemory shunts{};
 };
 
 }  // namespace drivebench

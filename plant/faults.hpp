@@ -18,9 +18,13 @@ inline constexpr std::uint64_t kCommandTimeout = 1u << 9;
 inline constexpr std::uint64_t kLeaseLost = 1u << 10;
 inline constexpr std::uint64_t kBenchOverrun = 1u << 11;
 inline constexpr std::uint64_t kDiverged = 1u << 12;
+inline constexpr std::uint64_t kBreakInput = 1u << 13;
 
 inline constexpr std::uint64_t kLatchedFaults =
-    kOverCurrentTrip | kCommandTimeout | kLeaseLost | kBenchOverrun | kDiverged;
+    kOverCurrentTrip | kCommandTimeout | kLeaseLost | kBenchOverrun | kDiverged | kBreakInput;
+
+/// Latched faults that keep the gates off.
+inline constexpr std::uint64_t kGatesOffFaults = kOverCurrentTrip | kBreakInput;
 
 /// Name and meaning of a fault bit.
 struct FaultInfo {
@@ -42,6 +46,7 @@ inline constexpr auto kFaultTable = std::to_array<FaultInfo>({
     {kLeaseLost, "lease_lost", "latched: the controller left or let its lease run out"},
     {kBenchOverrun, "bench_overrun", "latched: the bench was late beyond max_lateness and resynchronised"},
     {kDiverged, "diverged", "latched: a plant state left its envelope; the last finite outputs are held"},
+    {kBreakInput, "break_input", "latched: the break input opened all legs, by a current or the fault line"},
 });
 
 }  // namespace drivebench

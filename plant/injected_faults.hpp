@@ -41,6 +41,8 @@ struct InjectedFaults {
   double encoder_extra_pulses = 0.0;
   double current_sensor_noise = 0.0;
   double command_duplication = 0.0;
+  // Added later: see kLaterWords<AxisState>.
+  double gate_driver_fault = 0.0;
 };
 
 inline constexpr InjectedFaults kNoFaults{};
@@ -119,6 +121,8 @@ inline constexpr auto kInjectableFaults = std::to_array<InjectableFault>({
      "added to the rms of the noise of every measured phase current"},
     {"command_duplication", "1", 16, true, false, &InjectedFaults::command_duplication,
      "each command comes so many times more: copies are refused and counted, and feed no watchdog"},
+    {"gate_driver_fault", "1", 1, true, false, &InjectedFaults::gate_driver_fault,
+     "the fault line of the gate driver: all legs open inverter.break_delay_s after the start of the tick"},
 });
 
 inline constexpr std::size_t kInjectableFaultCount = kInjectableFaults.size();
@@ -140,7 +144,7 @@ constexpr bool is_of_drive(const InjectableFault& fault) noexcept {
       {&InjectedFaults::leg_stuck_high, &InjectedFaults::leg_stuck_low, &InjectedFaults::leg_stuck_off,
        &InjectedFaults::bus_sag, &InjectedFaults::field_loss, &InjectedFaults::command_loss,
        &InjectedFaults::command_delay, &InjectedFaults::command_corruption,
-       &InjectedFaults::command_duplication});
+       &InjectedFaults::command_duplication, &InjectedFaults::gate_driver_fault});
   for (const auto member : kMembers) {
     if (fault.member == member) return true;
   }

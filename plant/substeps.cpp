@@ -55,7 +55,9 @@ double fastest_swing_rad_s(const AxisParameters& p, const Machine& machine) noex
 template <class Machine>
 double fastest_electrical_s(const DriveParameters& p, const Machine& machine) noexcept {
   const SeriesImpedance z = series_impedance(p);
-  const Adjustment series{.series_resistance_ohm = z.resistance_ohm, .series_inductance_h = z.inductance_h};
+  const double switch_ohm = p.kind == DriveKind::kSwitched ? 2.0 * p.inverter.switch_ohm : 0.0;
+  const Adjustment series{.series_resistance_ohm = z.resistance_ohm + switch_ohm,
+                          .series_inductance_h = z.inductance_h};
   const double machine_s = fastest_time_constant_s(adjusted(machine, series));
   if (p.kind != DriveKind::kSource || !has_transformer(p.transformer)) return machine_s;
   return 1.0 / (1.0 / machine_s + constants_of(p.transformer).decay_per_s);

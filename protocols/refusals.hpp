@@ -157,8 +157,8 @@ inline constexpr auto kRefusals = [] {
       {R::kBeyondDrive,   "beyond drive",      T::kOutOfRange,  C::kBeyondDrive, M::kOutOfRange,  E::kIllegalValue,
        "a set-point is beyond what the drive of the axis can give, or moves faster than it may"},
       {R::kCauseLasts,    "cause lasts",       T::kCauseLasts,  C::kCauseLasts,  M::kCauseLasts,  E::kFailure,
-       "what caused the latched fault is still there: over-current, a lossy command link, or a controller whose "
-       "last command was refused for its values"},
+       "what caused the latched fault is still there: over-current, the fault line of a gate driver, a lossy "
+       "command link, or a controller whose last command was refused for its values"},
       {R::kUnknownAxis,   "no such axis",      T::kUnknownAxis, C::kNotOwner,    M::kUnknownAxis, E::kNoTarget,
        "there is no such axis"},
       {R::kWrongMode,     "wrong mode",        T::kWrongMode,   C::kBusy,        M::kWrongMode,   E::kFailure,

@@ -54,6 +54,10 @@ void Drive::set_parameters(const DriveParameters& p) noexcept {
   pwm_period_s_ = period_s_ / p.inverter.pwm_periods_per_tick;
   dead_part_ = p.inverter.dead_time_s / pwm_period_s_;
   filter_rate_per_s_ = kTurnRad * p.amplifier.filter_hz;
+  // A winding between two legs has a switch or a diode of both in its way.
+  const double in_series = connection_ == Connection::kStar ? 1.0 : 2.0;
+  diode_v_ = kind_ == DriveKind::kSwitched ? in_series * p.inverter.diode_v : 0.0;
+  switch_ohm_ = kind_ == DriveKind::kSwitched ? in_series * p.inverter.switch_ohm : 0.0;
   source_ = constants_of(p.source, connection_);
   has_transformer_ = kind_ == DriveKind::kSource && has_transformer(p.transformer);
   transformer_ = constants_of(p.transformer);
@@ -236,6 +240,8 @@ TerminalDrive Drive::bridge_output(DriveMemory& m, double start_s, double durati
   const Gates gates = m.switched_off != 0.0 ? Gates::kOff : order.gates;
   TerminalDrive out;
   out.rail_v = rail_v(m);
+  out.diode_v = diode_v_;
+  out.switch_ohm = switch_ohm_;
   if (has_switches(gates) || gates == Gates::kCurrent) {
     drive_terminals(m, order, start_s, current_a, out);
   } else if (gates == Gates::kOff) {

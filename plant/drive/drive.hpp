@@ -46,6 +46,11 @@ struct SeriesImpedance {
 };
 SeriesImpedance series_impedance(const DriveParameters& p) noexcept;
 
+/// Whether switches or diodes of the bridge take a voltage.
+constexpr bool has_switch_losses(const DriveParameters& p) noexcept {
+  return p.kind == DriveKind::kSwitched && (p.inverter.switch_ohm != 0.0 || p.inverter.diode_v != 0.0);
+}
+
 inline constexpr int kMaxDelayTicks = 8;           ///< of amplifier.delay_ticks
 inline constexpr int kMaxInjectedDelayTicks = 16;  ///< of the fault command_delay
 
@@ -223,6 +228,8 @@ class Drive {
                      const PhaseValues& voltage_v) const noexcept;
   void follow_loop(DriveMemory& m, double start_s, double duration_s, const PhaseValues& from_a,
                    const PhaseValues& to_a) const noexcept;
+  /// The voltages of the rails that the terminals hang on, without what switches and diodes take.
+  PhaseValues link_side_v(const TerminalDrive& applied, const PhaseValues& voltage_v) const noexcept;
   void follow_bus(DriveMemory& m, double duration_s, const TerminalDrive& applied,
                   const PhaseValues& voltage_v, const PhaseValues& from_a,
                   const PhaseValues& to_a) const noexcept;
@@ -235,6 +242,8 @@ class Drive {
   double tolerance_s_;  ///< instants closer than this are one
   double pwm_period_s_;
   double dead_part_;  ///< dead time over PWM period
+  double diode_v_;    ///< between a terminal and a rail
+  double switch_ohm_;
   double filter_rate_per_s_;
   SourceConstants source_;
   TransformerConstants transformer_;

@@ -1,4 +1,6 @@
 // The state of the drive after an interval: filter, current loop and link; and the output of a shared drive.
+#include <algorithm>
+
 #include "plant/drive/drive.hpp"
 #include "plant/drive/phases.hpp"
 #include "plant/math/exponential.hpp"
@@ -25,7 +27,9 @@ void Drive::follow(DriveMemory& m, double start_s, double duration_s, const Term
   }
   if (filter_rate_per_s_ > 0.0) follow_filter(m, duration_s, applied, voltage_v);
   if (kind_ == DriveKind::kCurrent) follow_loop(m, start_s, duration_s, from_a, to_a);
-  if (p_.bus.capacitance_f > 0.0) follow_bus(m, duration_s, applied, voltage_v, from_a, to_a);
+  if (p_.bus.capacitance_f == 0.0) return;
+  const bool loses = diode_v_ != 0.0 || switch_ohm_ != 0.0;
+  follow_bus(m, duration_s, applied, loses ? link_side_v(applied, voltage_v) : voltage_v, from_a, to_a);
 }
 
 /// With the gates off the filter follows the terminals, which the machine and the diodes hold.
@@ -63,6 +67,17 @@ void Drive::follow_loop(DriveMemory& m, double start_s, double duration_s, const
     const ThreePhase star = without_neutral(phases_of(m.integral_v));
     m.integral_v = {.a = star.a, .b = star.b, .c = star.c, .field = m.integral_v.field};
   }
+}
+
+PhaseValues Drive::link_side_v(const TerminalDrive& applied, const PhaseValues& voltage_v) const noexcept {
+  ThreePhase v = phases_of(voltage_v);
+  ThreePhase driven_v = applied.start_v;
+  for (int k = 0; k < terminals_; ++k) {
+    const bool driven = applied.mode[static_cast<std::size_t>(k)] == TerminalMode::kDriven;
+    double& of_phase = phase(v, k);
+    of_phase = driven ? phase(driven_v, k) : std::clamp(of_phase, -applied.rail_v, applied.rail_v);
+  }
+  return {.a = v.a, .b = v.b, .c = v.c, .field = voltage_v.field};
 }
 
 /// The field has a supply of its own; what an arc takes does not come back to the link.

@@ -22,8 +22,18 @@ struct TerminalDrive {
   ThreePhase start_v{};   ///< of driven terminals, at the start of the interval,
   ThreePhase middle_v{};  ///< in its middle
   ThreePhase end_v{};     ///< and at its end; the last two only if not constant
-  double rail_v = 0.0;    ///< diodes clamp to plus and minus this
+  double rail_v = 0.0;    ///< plus and minus this are the rails
   double field_v = 0.0;
+  double diode_v = 0.0;     ///< forward voltage of the diodes between a terminal and a rail
+  double switch_ohm = 0.0;  ///< of the closed switches between a driven terminal and its voltage
+
+  /// Diodes clamp to plus and minus this.
+  constexpr double clamp_v() const noexcept { return rail_v + diode_v; }
+  /// A floating terminal beyond this conducts. An event that was located there may be short of it by
+  /// rounding.
+  constexpr double conducts_above_v() const noexcept {
+    return diode_v > 0.0 ? clamp_v() * (1.0 - 1e-12) : rail_v;
+  }
 };
 
 }  // namespace drivebench

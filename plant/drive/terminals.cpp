@@ -52,20 +52,21 @@ void sort_terminals(Work& w) noexcept {
     if (w.driven(k)) {
       w.open &= ~terminal_bit(k);
       w.voltage_v[at(k)] = start[at(k)];
+      if (w.drive.switch_ohm != 0.0) w.voltage_v[at(k)] -= w.drive.switch_ohm * w.current_a[at(k)];
     } else if (w.conducts(k) && w.current_a[at(k)] != 0.0) {
       w.dying |= terminal_bit(k);
-      w.voltage_v[at(k)] = terminals_detail::against(w.current_a[at(k)], w.drive.rail_v);
+      w.voltage_v[at(k)] = terminals_detail::against(w.current_a[at(k)], w.drive.clamp_v());
     } else {
       w.open |= terminal_bit(k);
     }
   }
 }
 
-/// A diode begins to conduct: the terminal goes to the rail on this side.
+/// A diode begins to conduct: the terminal goes to the rail on this side, and beyond it by its voltage.
 void clamp_terminal(Work& w, int k, double side) noexcept {
   w.open &= ~terminal_bit(k);
   w.dying |= terminal_bit(k);
-  w.voltage_v[at(k)] = side * w.drive.rail_v;
+  w.voltage_v[at(k)] = side * w.drive.clamp_v();
 }
 
 int conducting_count(const Work& w) noexcept {
@@ -102,7 +103,7 @@ bool start_rectifier(Work& w, const Phases& winding_v) noexcept {
     if (high < 0 || winding_v[at(k)] > winding_v[at(high)]) high = k;
     if (low < 0 || winding_v[at(k)] < winding_v[at(low)]) low = k;
   }
-  if (high < 0 || high == low || winding_v[at(high)] - winding_v[at(low)] <= 2.0 * w.drive.rail_v)
+  if (high < 0 || high == low || winding_v[at(high)] - winding_v[at(low)] <= 2.0 * w.drive.conducts_above_v())
     return false;
   clamp_terminal(w, high, 1.0);
   clamp_terminal(w, low, -1.0);
@@ -121,7 +122,7 @@ bool float_once(Work& w) noexcept {
     if (w.conducts(k)) continue;
     const double floating_v = neutral_v + winding_v[at(k)];
     w.voltage_v[at(k)] = floating_v;
-    if (!w.has_diodes(k) || alone || std::abs(floating_v) <= w.drive.rail_v) continue;
+    if (!w.has_diodes(k) || alone || std::abs(floating_v) <= w.drive.conducts_above_v()) continue;
     clamp_terminal(w, k, floating_v > 0.0 ? 1.0 : -1.0);
     return true;
   }
@@ -254,18 +255,29 @@ PhaseValues with_floating(Connection connection, TerminalSet floating, const Pha
   return {.a = v[0], .b = v[1], .c = v[2], .field = conducting_v.field};
 }
 
+PhaseValues behind_switches(Connection connection, const TerminalDrive& drive, const PhaseValues& ideal_v,
+                            const PhaseValues& current_a) noexcept {
+  PhaseValues v = ideal_v;
+  const TerminalSet driven = driven_terminals(connection, drive);
+  if ((driven & 1u) != 0) v.a -= drive.switch_ohm * current_a.a;
+  if ((driven & 2u) != 0) v.b -= drive.switch_ohm * current_a.b;
+  if ((driven & 4u) != 0) v.c -= drive.switch_ohm * current_a.c;
+  return v;
+}
+
 bool diodes_block(Connection connection, const TerminalDrive& drive,
                   const WindingValues& open_circuit_v) noexcept {
   const Phases emf_v = winding_phases(connection, open_circuit_v);
-  double highest_v = -drive.rail_v;
-  double lowest_v = drive.rail_v;
+  const double most_v = drive.conducts_above_v();
+  double highest_v = -most_v;
+  double lowest_v = most_v;
   for (int k = 0; k < terminal_count(connection); ++k) {
     if (drive.mode[at(k)] != TerminalMode::kDiodes) continue;
     highest_v = std::max(highest_v, emf_v[at(k)]);
     lowest_v = std::min(lowest_v, emf_v[at(k)]);
   }
-  if (connection == Connection::kStar) return highest_v - lowest_v <= 2.0 * drive.rail_v;
-  return highest_v <= drive.rail_v && lowest_v >= -drive.rail_v;
+  if (connection == Connection::kStar) return highest_v - lowest_v <= 2.0 * most_v;
+  return highest_v <= most_v && lowest_v >= -most_v;
 }
 
 TerminalCircuit connect(Connection connection, const TerminalDrive& drive, const InjectedFaults& faults,
@@ -295,6 +307,8 @@ TerminalCircuit connect(Connection connection, const TerminalDrive& drive, const
     return circuit_input(w, v);
   };
   circuit.start = input(drive.start_v, circuit.start_v);
+  if (drive.switch_ohm != 0.0)
+    circuit.start_v = behind_switches(connection, drive, circuit.start_v, current_a);
   if (drive.constant) {
     circuit.mean_v = circuit.end_v = circuit.start_v;
   } else {

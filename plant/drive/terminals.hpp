@@ -94,11 +94,12 @@ constexpr double above_negative_rail(Connection connection, double terminal_v, d
 }
 
 /// The terminals of an open star against the negative rail of a link: no switch holds its neutral, and the
-/// diodes hold no terminal beyond a rail.
-constexpr ThreePhase within_rails(const ThreePhase& v, double link_v) noexcept {
+/// diodes hold no terminal beyond a rail and their forward voltage.
+constexpr ThreePhase within_rails(const ThreePhase& v, double link_v, double diode_v) noexcept {
   const double high_v = std::max({v.a, v.b, v.c});
   const double low_v = std::min({v.a, v.b, v.c});
-  const double shift_v = high_v > link_v ? link_v - high_v : low_v < 0.0 ? -low_v : 0.0;
+  const double most_v = link_v + diode_v;
+  const double shift_v = high_v > most_v ? most_v - high_v : low_v < -diode_v ? -diode_v - low_v : 0.0;
   return {.a = v.a + shift_v, .b = v.b + shift_v, .c = v.c + shift_v};
 }
 
@@ -117,15 +118,19 @@ constexpr int driven_count(Connection connection, const TerminalDrive& drive) no
   return driven;
 }
 
+/// The voltages of terminals of which the driven ones were those before their switches, at these currents.
+PhaseValues behind_switches(Connection connection, const TerminalDrive& drive, const PhaseValues& ideal_v,
+                            const PhaseValues& current_a) noexcept;
+
 /// Whether the diodes of terminals of which none is driven block: no emf is beyond them.
 bool diodes_block(Connection connection, const TerminalDrive& drive,
                   const WindingValues& open_circuit_v) noexcept;
 
 namespace terminals_detail {
 
-/// The voltage that drives a current to zero: its diode's rail, or the arc of a broken wire.
-constexpr double against(double current_a, double rail_v) noexcept {
-  return current_a > 0.0 ? -rail_v : rail_v;
+/// The voltage that drives a current to zero: that of a terminal on its diode, or the arc of a broken wire.
+constexpr double against(double current_a, double clamp_v) noexcept {
+  return current_a > 0.0 ? -clamp_v : clamp_v;
 }
 
 }  // namespace terminals_detail
@@ -142,7 +147,7 @@ constexpr bool all_conduct(Connection connection, const TerminalDrive& drive, Te
     if (drive.mode[static_cast<std::size_t>(k)] == TerminalMode::kDriven) return true;
     if ((open >> k & 1u) != 0 || i == 0.0) return false;
     dying |= TerminalSet{1} << k;
-    v = terminals_detail::against(i, drive.rail_v);
+    v = terminals_detail::against(i, drive.clamp_v());
     return true;
   };
   const int count = terminal_count(connection);

@@ -215,17 +215,21 @@ void add_problems(const DriveParameters& p, Problems& found) {
 }
 
 void add_shared_problems(const DriveParameters& p, Problems& found) {
+  const auto must_be_zero = [&found](std::string_view name, double value) {
+    if (value == 0.0) return;
+    found.add(name,
+              [&] { return "is " + text(value) + " but must be 0 where two machines share the amplifier"; });
+  };
+  must_be_zero("inverter.switch_ohm", p.inverter.switch_ohm);
+  must_be_zero("inverter.diode_v", p.inverter.diode_v);
+  must_be_zero("inverter.break_current_a", p.inverter.break_current_a);
   if (p.kind == DriveKind::kCurrent || p.kind == DriveKind::kSource) {
     found.add("drive.kind", [&] {
       return "is \"" + std::string(kKinds[static_cast<std::size_t>(p.kind)]) +
              "\" but two machines share voltage amplifiers and inverters only";
     });
   }
-  if (p.amplifier.filter_hz != 0.0) {
-    found.add("amplifier.filter_hz", [&] {
-      return "is " + text(p.amplifier.filter_hz) + " but must be 0 where two machines share the amplifier";
-    });
-  }
+  must_be_zero("amplifier.filter_hz", p.amplifier.filter_hz);
 }
 
 void add_period_problems(const DriveParameters& p, double period_s, Problems& found) {

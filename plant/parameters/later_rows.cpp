@@ -16,7 +16,17 @@ constexpr Parameter comparator_row(std::string_view name, std::string_view unit,
                                                                               traits | kLater, meaning);
 }
 
+constexpr auto kShuntPlaces = std::to_array<std::string_view>({"inline", "low_side", "link"});
+
+template <auto Member>
+constexpr auto inverter = row<&AxisParameters::drive, &DriveParameters::inverter, Member>;
+template <auto Member>
+constexpr auto ntc = row<&AxisParameters::sensors, &SensorParameters::ntc, Member>;
+template <auto Member>
+constexpr auto shunts = row<&AxisParameters::sensors, &SensorParameters::shunts, Member>;
+
 using Comparator = ComparatorParameters;
+using Inverter = InverterParameters;
 
 constexpr auto kTable = std::to_array<Parameter>({
     row<&AxisParameters::sensors, &SensorParameters::terminals>(
@@ -56,6 +66,37 @@ constexpr auto kTable = std::to_array<Parameter>({
     row<&AxisParameters::encoder, &EncoderParameters::capture_hz>(
         "encoder.capture_hz", "Hz", 0, 1e9, kLater,
         "clock of the timer that measures the time between edges, encoder_capture; 0: there is none"),
+    inverter<&Inverter::switch_ohm>("inverter.switch_ohm", "ohm", 0, 1e3, kLive | kLater,
+                                    "R_ds(on) of a closed switch of the switched inverter"),
+    inverter<&Inverter::diode_v>(
+        "inverter.diode_v", "V",
+        0, 100, kLive | kLater,
+        "forward voltage of a diode of the switched inverter; above 0 the instant at "
+        "which a diode begins to conduct is located"),
+    inverter<&Inverter::break_current_a>(
+        "inverter.break_current_a", "A",
+        0, 1e6, kLive | kLater,
+        "comparator of the break input: a phase current beyond it opens all legs until cleared; 0: none"),
+    inverter<&Inverter::break_delay_s>("inverter.break_delay_s", "s", 0, 1e-2, kLive | kLater,
+                                       "from the comparator or the fault line until the legs are open"),
+    choice(shunts<&ShuntParameters::place>(
+               "current_sensor.place", "1", 0, 0, kInteger | kLater,
+               "inline: wires of the motor; low_side: lower switch of each leg; link: i_a and i_b are two "
+               "conversions of the current of the link"),
+           kShuntPlaces),
+    shunts<&ShuntParameters::sample_s>(
+        "current_sensor.sample_s", "s", 0, 1, kLater,
+        "instant of the first conversion in the tick that leads to the sample; 0: at its end"),
+    shunts<&ShuntParameters::conversion_s>("current_sensor.conversion_s", "s", 0, 1, kLater,
+                                           "from one conversion to the next; 0: all at once"),
+    ntc<&NtcParameters::ohm>(
+        "temperature_sensor.ntc_ohm", "ohm", 0, 1e9, kLater,
+        "thermistor at 25 degrees Celsius, of which temperature_counts is the divider's; 0: "
+        "none, linear in kelvin"),
+    ntc<&NtcParameters::beta_k>("temperature_sensor.ntc_beta_k", "K", 0, 1e5, kLater,
+                                "B of the thermistor, R = R_25 exp(B (1/T - 1/298.15 K))"),
+    ntc<&NtcParameters::pull_ohm>("temperature_sensor.ntc_pull_ohm", "ohm", 0, 1e9, kLater,
+                                  "resistor from the thermistor to the reference of the converter"),
 });
 
 bool has_bits(const SensorParameters& p) noexcept {
@@ -79,6 +120,65 @@ void add_comparator_problems(const AxisParameters& p, Problems& found) {
   }
 }
 
+void add_switch_problems(const DriveParameters& p, Problems& found) {
+  const auto needs = [&found](std::string_view name, double value, std::string_view what) {
+    found.add(name, [&] { return "is " + text(value) + " but must be 0 " + std::string(what); });
+  };
+  constexpr std::string_view kSwitched = "unless drive.kind is \"switched_inverter\"";
+  if (p.kind != DriveKind::kSwitched) {
+    if (p.inverter.switch_ohm != 0.0) needs("inverter.switch_ohm", p.inverter.switch_ohm, kSwitched);
+    if (p.inverter.diode_v != 0.0) needs("inverter.diode_v", p.inverter.diode_v, kSwitched);
+  }
+  if (p.kind != DriveKind::kSwitched && p.kind != DriveKind::kAveraged && p.inverter.break_current_a != 0.0) {
+    needs("inverter.break_current_a", p.inverter.break_current_a, "unless drive.kind is an inverter");
+  }
+}
+
+void add_shunt_problems(const AxisParameters& p, Problems& found) {
+  const ShuntParameters& s = p.sensors.shunts;
+  const auto place = static_cast<std::size_t>(s.place);
+  if (place >= kShuntPlaces.size()) return;  // the limits of its row say so
+  if (s.place != ShuntPlace::kInline &&
+      (p.drive.kind != DriveKind::kSwitched || connection_of(p.machine) != Connection::kStar)) {
+    found.add("current_sensor.place", [&] {
+      return "is \"" + std::string(kShuntPlaces[place]) +
+             "\" but needs drive.kind = \"switched_inverter\" and a machine with three phases in a star";
+    });
+  }
+  if (s.place == ShuntPlace::kLink && !(s.sample_s > 0.0 && s.conversion_s > 0.0)) {
+    found.add("current_sensor.place",
+              "is \"link\" but needs current_sensor.sample_s and conversion_s above 0: two instants");
+  }
+  if (s.conversion_s > 0.0 && s.sample_s == 0.0) {
+    found.add("current_sensor.conversion_s", [&] {
+      return "is " + text(s.conversion_s) + " s but must be 0 where current_sensor.sample_s is 0";
+    });
+  }
+  if (!s.used()) return;
+  if (p.sensors.current.filter_hz > 0.0) {
+    found.add("current_sensor.filter_hz", [&] {
+      return "is " + text(p.sensors.current.filter_hz) +
+             " Hz but must be 0 with current_sensor.place or sample_s: the filter is that of the wires";
+    });
+  }
+  if (p.sensors.current.delay_ticks == 0.5) {
+    found.add("current_sensor.delay_ticks",
+              "is 0.5 but must be whole with current_sensor.place or sample_s, which gives the instant");
+  }
+}
+
+void add_ntc_problems(const SensorParameters& p, Problems& found) {
+  if (p.ntc.ohm == 0.0) return;
+  if (!(p.ntc.beta_k > 0.0 && p.ntc.pull_ohm > 0.0)) {
+    found.add("temperature_sensor.ntc_ohm",
+              "needs temperature_sensor.ntc_beta_k and ntc_pull_ohm above 0: the divider of the thermistor");
+  }
+  if (!(p.counts && p.temperature.enabled && p.temperature.bits > 0)) {
+    found.add("temperature_sensor.ntc_ohm",
+              "needs converter.counts and a temperature_sensor that is enabled with bits");
+  }
+}
+
 }  // namespace
 
 std::span<const Parameter> later_rows() noexcept {
@@ -97,6 +197,9 @@ void add_later_problems(const AxisParameters& p, Problems& found) {
     });
   }
   add_comparator_problems(p, found);
+  add_switch_problems(p.drive, found);
+  add_shunt_problems(p, found);
+  add_ntc_problems(p.sensors, found);
   if (p.sensors.counts && !has_bits(p.sensors)) {
     found.add("converter.counts",
               "is 1 but no converter has bits: current_sensor.bits, or voltage_sensor, bus_sensor or "
@@ -107,6 +210,16 @@ void add_later_problems(const AxisParameters& p, Problems& found) {
       return "is " + text(p.encoder.capture_hz) + " Hz but needs encoder.timer_bits above 0, which is 0";
     });
   }
+}
+
+void add_period_problems(const SensorParameters& p, double period_s, Problems& found) {
+  const ShuntParameters& s = p.shunts;
+  const double last_s = s.sample_s + (s.place == ShuntPlace::kLink ? 1.0 : 2.0) * s.conversion_s;
+  if (last_s <= period_s) return;
+  found.add("current_sensor.sample_s", [&] {
+    return "is " + text(s.sample_s) + " s: the last conversion at " + text(last_s) +
+           " s must lie within the tick, which is " + text(period_s) + " s";
+  });
 }
 
 }  // namespace drivebench

@@ -13,4 +13,7 @@ std::span<const Parameter> later_rows() noexcept;
 /// Their rules with other values.
 void add_later_problems(const AxisParameters& p, Problems& found);
 
+/// The rules with the sample period.
+void add_period_problems(const SensorParameters& p, double period_s, Problems& found);
+
 }  // namespace drivebench

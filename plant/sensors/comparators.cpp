@@ -84,6 +84,10 @@ class Comparators::Input {
   Runs runs(double from_s, double to_s) const noexcept {
     Runs result;
     result.add(from_s);
+    if (keeps_direction(from_s, to_s)) {
+      result.add(to_s);
+      return result;
+    }
     const double bend_s = bend();
     if (bend_s > from_s && bend_s < to_s) {
       add_turn(from_s, bend_s, result);
@@ -97,6 +101,13 @@ class Comparators::Input {
 
  private:
   bool filters() const noexcept { return rate_per_s_ > 0.0; }
+  /// Whether parabola and transient go the same way, so that it turns nowhere: no exponential is needed.
+  bool keeps_direction(double from_s, double to_s) const noexcept {
+    const double from = slope_ + 2.0 * curve_ * from_s;
+    const double to = slope_ + 2.0 * curve_ * to_s;
+    const double settling = filters() ? -transient_v_ : 0.0;
+    return (from >= 0.0 && to >= 0.0 && settling >= 0.0) || (from <= 0.0 && to <= 0.0 && settling <= 0.0);
+  }
   double along(double t) const noexcept { return constant_v_ + t * (slope_ + t * curve_); }
   double decay(double t) const noexcept { return exponential(-rate_per_s_ * t); }
   double slope(double t) const noexcept {

@@ -257,8 +257,7 @@ void SensorBank::end_tick(SensorMemory& m, const Measurable& now, Tick tick) con
   m.meter.sums = {};
 }
 
-AnalogReading SensorBank::read(const SensorMemory& m, Channel c, const Errors& errors,
-                               Tick tick) const noexcept {
+double SensorBank::analog(const SensorMemory& m, Channel c, const Errors& errors, Tick tick) const noexcept {
   const std::size_t n = at(c);
   const AnalogParameters& p = channels_[n];
   const Tick sampled = m.tick - static_cast<Tick>(p.delay_ticks);
@@ -267,7 +266,13 @@ AnalogReading SensorBank::read(const SensorMemory& m, Channel c, const Errors& e
   if (errors.noise_rms > 0.0) {
     noise = gaussian_noise(seed_, noise_channel_ + n, static_cast<std::uint64_t>(tick));
   }
-  return converted(errors.gain * x + errors.offset + errors.noise_rms * noise, p.bits, p.full_scale);
+  return errors.gain * x + errors.offset + errors.noise_rms * noise;
+}
+
+AnalogReading SensorBank::read(const SensorMemory& m, Channel c, const Errors& errors,
+                               Tick tick) const noexcept {
+  const AnalogParameters& p = channels_[at(c)];
+  return converted(analog(m, c, errors, tick), p.bits, p.full_scale);
 }
 
 Sample SensorBank::readings(const SensorMemory& m, const InjectedFaults& faults, Tick tick) const noexcept {
@@ -312,6 +317,11 @@ Sample SensorBank::readings(const SensorMemory& m, const InjectedFaults& faults,
   s.bus_voltage_v = p_.bus.enabled ? counted(Channel::kBus, s.bus_counts) : now[at(Channel::kBus)];
   s.u_n_v = other(Channel::kNeutral);
   s.temperature_k = counted(Channel::kTemperature, s.temperature_counts);
+  if (p_.ntc.ohm > 0.0 && p_.counts) {
+    const AnalogParameters& p = p_.temperature;
+    const Errors errors{p.gain, p.offset, p.noise_rms};
+    s.temperature_counts = ntc_count(p_.ntc, analog(m, Channel::kTemperature, errors, tick), p.bits);
+  }
   s.tachometer_v = other(Channel::kTachometer, faults.tachometer_loss != 0.0);
   s.resolver_sin_v = other(Channel::kResolverSine, faults.resolver_loss == 1.0);
   s.resolver_cos_v = other(Channel::kResolverCosine, faults.resolver_loss == 2.0);

@@ -110,6 +110,8 @@ class SensorBank {
     double offset;
     double noise_rms;
   };
+  /// What the converter of a channel sees.
+  double analog(const SensorMemory& m, Channel c, const Errors& errors, Tick tick) const noexcept;
   AnalogReading read(const SensorMemory& m, Channel c, const Errors& errors, Tick tick) const noexcept;
 
   SensorParameters p_;

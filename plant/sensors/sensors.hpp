@@ -5,7 +5,9 @@
 #include "plant/sensors/current_sensor.hpp"
 #include "plant/sensors/hall.hpp"
 #include "plant/sensors/meter.hpp"
+#include "plant/sensors/ntc.hpp"
 #include "plant/sensors/resolver.hpp"
+#include "plant/sensors/shunts.hpp"
 #include "plant/sensors/tachometer.hpp"
 
 namespace drivebench {
@@ -24,6 +26,8 @@ struct SensorParameters {
   bool terminals = false;  ///< the terminals are shown against the negative rail
   bool counts = false;     ///< the numbers of the converters are shown
   ComparatorParameters comparator{};
+  ShuntParameters shunts{};
+  NtcParameters ntc{};
 
   /// Whether something follows the terminals against the negative rail.
   bool follow_terminals() const noexcept { return terminals || comparator.enabled; }

@@ -1,5 +1,8 @@
 #include "plant/train/drive_train.hpp"
 
+#include <algorithm>
+#include <cmath>
+
 #include "plant/faults.hpp"
 
 namespace drivebench {
@@ -56,10 +59,28 @@ void trip(AxisCore& core, AxisState& state) noexcept {
   core.drive.switch_off(state.drive);  // for what is left of the tick, too
 }
 
+void pull_break(const AxisCore& core, AxisState& state, double now_s) noexcept {
+  state.break_input = {.pending = 1, .due_s = now_s + core.p.drive.inverter.break_delay_s};
+}
+
+bool meet_break(AxisCore& core, AxisState& state, double now_s, const PhaseValues& current_a) noexcept {
+  const double limit_a = core.p.drive.inverter.break_current_a;
+  const double largest_a = std::max({std::abs(current_a.a), std::abs(current_a.b), std::abs(current_a.c)});
+  if (watches_break(core, state) && largest_a > limit_a) pull_break(core, state, now_s);
+  if (state.break_input.opens_s() > now_s) return false;
+  state.break_input = {};
+  state.faults |= kBreakInput;
+  core.drive.switch_off(state.drive);
+  return true;
+}
+
 void follow_piece(AxisCore& core, AxisState& state, double start_s, double duration_s,
                   const TerminalDrive& drive, const TerminalCircuit& circuit, const Measurable& from,
                   const Measurable& to) noexcept {
   core.drive.finish(state.drive, start_s, duration_s, drive, circuit.mean_v, from.current_a, to.current_a);
+  if (core.shunts.used()) {
+    core.shunts.follow(state.shunts, start_s + duration_s, to.current_a, circuit.end_v);
+  }
   if (!has_impedance(core.p.drive)) {
     state.voltage_v = to.voltage_v;
     if (core.sensors.follows()) core.sensors.follow(state.sensors, start_s, duration_s, from, to);

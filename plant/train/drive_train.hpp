@@ -71,6 +71,13 @@ class DriveTrain final : public Train {
     bool open = false;        ///< no terminal is driven, none carries a current
     bool stays = false;       ///< either of them, and the next piece has the same
     TerminalSet off = 0;      ///< terminals without a current
+    // With a drive whose switches or diodes take a voltage, or with a break input:
+    Connection connection{};
+    double switch_ohm = 0.0;     ///< in series with each driven terminal
+    bool has_switching = false;  ///< one of the next two ends the piece
+    TerminalSet turning_on = 0;  ///< terminals whose diodes begin to conduct where they pass a rail
+    bool floats_alone = false;   ///< and no terminal of the star is held
+    bool watched = false;        ///< by the break input
   };
 
   /// The part of a piece up to its first event.
@@ -117,6 +124,23 @@ class DriveTrain final : public Train {
                              double load_nm) const noexcept;
   [[gnu::noinline]] void step_varying(const AxisCore& core, Whole& x, double duration_s,
                                       const ShaftBranch& branch, double load_nm) const noexcept;
+  [[gnu::noinline]] void step_behind_switches(const AxisCore& core, Whole& x, double duration_s,
+                                              const ShaftBranch& branch, double load_nm) const noexcept;
+  /// The input of the windings with what the closed switches take.
+  TerminalInput input_behind_switches(Connection connection, const State& x,
+                                      const RotorMotion& motion) const noexcept;
+  /// The voltages of the terminals at both ends of the piece and in its mean.
+  void take_switch_voltages(Connection connection, const PhaseValues& from_a,
+                            const PhaseValues& to_a) noexcept;
+  /// What the piece has to watch beside the currents that die.
+  [[gnu::noinline]] void watch_switching(const AxisCore& core, const AxisState& state) noexcept;
+  /// The terminals where the piece has come to this state of the machine.
+  PhaseValues floating_within(const AxisCore& core, const State& x, const RotorMotion& motion) const noexcept;
+  /// Diodes that begin to conduct, and currents at the limit of the break input.
+  [[gnu::noinline]] void add_switching(const AxisCore& core, const AxisState& state, const State& x,
+                                       const RotorMotion& motion, EventValues& values) const noexcept;
+  /// The number of events of terminals and emf before those of the break input.
+  int first_break_event() const noexcept;
   /// Makes it a circuit of constant voltages in which no current dies.
   void hold_constant(const TerminalInput& input) noexcept;
   void drive_windings(const AxisCore& core, const ThreePhase& terminal_v) noexcept;
@@ -131,7 +155,8 @@ class DriveTrain final : public Train {
   bool leave_open(const AxisCore& core, const State& x, const RotorMotion& motion) noexcept;
   void connect_piece(AxisCore& core, AxisState& state, double start_s, double duration_s, const State& x,
                      const RotorMotion& motion) noexcept;
-  /// The step up to the event that comes first.
+  /// The step up to the event that comes first. kSwitching: add_switching() has events, too.
+  template <bool kSwitching>
   Cut cut_at_event(AxisCore& core, AxisState& state, const Whole& from, Whole& to, double start_s,
                    double duration_s, const ShaftBranch& branch, double load_nm) noexcept;
   /// The distances to events. `current_a` are the terminals' currents, at the start of a piece those that

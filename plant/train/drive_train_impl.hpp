@@ -1,5 +1,7 @@
 #pragma once
 
+#include "plant/train/drive_train_events.hpp"
+#include "plant/train/drive_train_switches.hpp"
 #include "plant/train/drive_train_terminals.hpp"
 
 namespace drivebench {
@@ -61,6 +63,7 @@ template <class Machine, class Shaft>
 void DriveTrain<Machine, Shaft>::step(const AxisCore& core, Whole& x, double duration_s,
                                       const ShaftBranch& branch, double load_nm) const noexcept {
   if (!piece_.circuit.constant) return step_varying(core, x, duration_s, branch, load_nm);
+  if (piece_.switch_ohm != 0.0) return step_behind_switches(core, x, duration_s, branch, load_nm);
   x = rk4_step(x, duration_s, [&](const Whole& s) noexcept -> Whole {
     return slope(core, s, piece_.circuit.start, branch, load_nm);
   });
@@ -79,81 +82,13 @@ void DriveTrain<Machine, Shaft>::step_varying(const AxisCore& core, Whole& x, do
 }
 
 template <class Machine, class Shaft>
-void DriveTrain<Machine, Shaft>::add_electrical(TerminalSet dying, const PhaseValues& current_a,
-                                                const RotorMotion& motion, double corner,
-                                                EventValues& values) const noexcept {
-  if ((dying & 1u) != 0) values.add(current_a.a);
-  if ((dying & 2u) != 0) values.add(current_a.b);
-  if ((dying & 4u) != 0) values.add(current_a.c);
-  if constexpr (Machine::kHasCorners) {
-    if (corner != kNoCorner) values.add(corner_position(c_, motion.angle_rad) - corner);
-  }
-}
-
-template <class Machine, class Shaft>
-double DriveTrain<Machine, Shaft>::corner_between(const RotorMotion& from,
-                                                  const RotorMotion& to) const noexcept {
-  if constexpr (Machine::kHasCorners) {
-    return corner_on_the_way(corner_position(c_, from.angle_rad), corner_position(c_, to.angle_rad));
-  } else {
-    return kNoCorner;
-  }
-}
-
-template <class Machine, class Shaft>
-EventValues DriveTrain<Machine, Shaft>::values_at(const AxisCore& core, TerminalSet dying,
-                                                  const PhaseValues& current_a, const Whole& x,
-                                                  const ShaftBranch& branch, double load_nm,
-                                                  double corner) const noexcept {
-  EventValues values;
-  if (core.shaft_has_events) {
-    std::array<double, 4> shaft{};
-    const double driving_nm = is_held(branch) ? torque_nm(c_, x.machine, motion_of(x)) : 0.0;
-    values.shaft = event_values(core.shaft, x.shaft, branch, driving_nm, load_nm, shaft);
-    for (int k = 0; k < values.shaft; ++k)
-      values.add(shaft[static_cast<std::size_t>(k)]);
-  }
-  add_electrical(dying, current_a, motion_of(x), corner, values);
-  return values;
-}
-
-template <class Machine, class Shaft>
-auto DriveTrain<Machine, Shaft>::cut_at_event(AxisCore& core, AxisState& state, const Whole& from, Whole& to,
-                                              double start_s, double duration_s, const ShaftBranch& branch,
-                                              double load_nm) noexcept -> Cut {
-  const TerminalSet dying = piece_.circuit.dying;
-  const double corner = corner_between(motion_of(from), motion_of(to));
-  const auto values = [&](const Whole& x) noexcept {
-    const PhaseValues current_a = dying != 0 ? currents(core, state, x.machine, motion_of(x)) : PhaseValues{};
-    return values_at(core, dying, current_a, x, branch, load_nm, corner);
-  };
-  const EventValues before = values_at(core, dying, piece_.current_a, from, branch, load_nm, corner);
-  const Crossing crossing = located_event(before, values(to), [&](double fraction) noexcept {
-    const double shorter_s = fraction * duration_s;
-    if (!piece_.circuit.constant) {  // its voltages are those of the whole piece
-      connect_piece(core, state, start_s, shorter_s, from.machine, motion_of(from));
-    }
-    to = from;
-    step(core, to, shorter_s, branch, load_nm);
-    return values(to);
-  });
-  Cut cut{.fraction = crossing.fraction};
-  if (crossing.event >= before.shaft) {
-    cut.electrical_event = crossing.event - before.shaft;
-  } else if (crossing.event >= 0) {
-    to.shaft = settled(core.shaft, to.shaft, crossing.event);
-    cut.freed = freed_by(branch, crossing.event);
-  }
-  return cut;
-}
-
-template <class Machine, class Shaft>
 void DriveTrain<Machine, Shaft>::finish_piece(AxisCore& core, AxisState& state,
                                               const Passed& passed) noexcept {
   const auto& [start_s, duration_s, from, to, from_motion, to_motion] = passed;
   if (core.follows) {
     const PhaseValues from_a = piece_.current_a;
     piece_.current_a = currents(core, state, to, to_motion);
+    if (piece_.switch_ohm != 0.0) take_switch_voltages(core.connection, from_a, piece_.current_a);
     const Measurable before = measurable(core, state, from, from_motion, from_a, piece_.circuit.start_v);
     const Measurable after =
         measurable(core, state, to, to_motion, piece_.current_a, end_voltages(core, state, to, to_motion));
@@ -177,11 +112,13 @@ void DriveTrain<Machine, Shaft>::run_piece(AxisCore& core, AxisState& state, Who
   const bool blocked = state.injected.blocked_rotor != 0.0;
   Freed freed;
   for (std::size_t events = 0; start_s < end_s; ++events) {
-    const double duration_s = end_s - start_s;
     if (core.shaft_has_events || blocked) x.shaft = locked(core.shaft, x.shaft, blocked);
     const Whole from = x;
     const RotorMotion from_motion = motion_of(from);
     piece_.current_a = currents(core, state, from.machine, from_motion);
+    if (core.breaks && meet_break(core, state, start_s, piece_.current_a)) piece_.stays = false;
+    const double stop_s = piece_stop_s(core, state, start_s, end_s);
+    const double duration_s = stop_s - start_s;
     connect_piece(core, state, start_s, duration_s, from.machine, from_motion);
     ShaftBranch branch;
     if (core.shaft_has_events || blocked) {
@@ -189,10 +126,13 @@ void DriveTrain<Machine, Shaft>::run_piece(AxisCore& core, AxisState& state, Who
                          false, freed);
     }
     step(core, x, duration_s, branch, load_nm);
-    const bool may_cut = piece_.circuit.dying != 0 || core.shaft_has_events || Machine::kHasCorners;
+    const bool may_cut =
+        piece_.circuit.dying != 0 || core.shaft_has_events || Machine::kHasCorners || piece_.has_switching;
     Cut cut;
     if (may_cut && events < kMaxEvents) {
-      cut = cut_at_event(core, state, from, x, start_s, duration_s, branch, load_nm);
+      cut = piece_.has_switching
+                ? cut_at_event<true>(core, state, from, x, start_s, duration_s, branch, load_nm)
+                : cut_at_event<false>(core, state, from, x, start_s, duration_s, branch, load_nm);
       if (cut.electrical_event >= 0) {
         settle_terminals(core, state, x.machine, motion_of(x), cut.electrical_event);
       }
@@ -200,7 +140,8 @@ void DriveTrain<Machine, Shaft>::run_piece(AxisCore& core, AxisState& state, Who
     freed = cut.freed;
     const double passed_s = cut.fraction < 1.0 ? cut.fraction * duration_s : duration_s;
     finish_piece(core, state, {start_s, passed_s, from.machine, x.machine, from_motion, motion_of(x)});
-    start_s = cut.fraction < 1.0 ? start_s + passed_s : end_s;
+    start_s = cut.fraction < 1.0 ? start_s + passed_s : stop_s;
+    if (piece_.watched && cut.electrical_event >= first_break_event()) pull_break(core, state, start_s);
   }
 }
 
@@ -252,7 +193,7 @@ void DriveTrain<Machine, Shaft>::run(AxisCore& core, AxisState& state, double lo
   x.machine = machine_of(state);
   x.shaft = shaft_of(state);
   look_up_angle(x.shaft);
-  piece_.plain = piece_.open = piece_.stays = false;
+  piece_.plain = piece_.open = piece_.stays = piece_.has_switching = false;
   const bool smooth =
       !Machine::kHasCorners && !core.shaft_has_events && !core.follows && state.injected.blocked_rotor == 0.0;
   for (int n = 0; n < core.timing.substeps; ++n) {
@@ -289,7 +230,7 @@ void DriveTrain<Machine, Shaft>::run_part(AxisCore& core, AxisState& state, doub
   x.machine = machine_of(state);
   x.shaft = shaft_of(state);
   look_up_angle(x.shaft);
-  piece_.plain = piece_.open = piece_.stays = false;
+  piece_.plain = piece_.open = piece_.stays = piece_.has_switching = false;
   run_piece(core, state, x, start_s, end_s, load_nm);
   const RotorMotion motion = motion_of(x);
   keep_open(core, state, x.machine, motion);
@@ -324,7 +265,11 @@ void DriveTrain<Machine, Shaft>::stage(int number, double duration_s, const Roto
   const TerminalInput& u = circuit.constant || number == 0 ? circuit.start
                            : number == 3                   ? circuit.end
                                                            : circuit.middle;
-  const State slope = derivative(c_, piece_.stage, turned(motion), u);
+  const State slope =
+      piece_.switch_ohm == 0.0
+          ? derivative(c_, piece_.stage, turned(motion), u)
+          : derivative(c_, piece_.stage, turned(motion),
+                       input_behind_switches(piece_.connection, piece_.stage, turned(motion)));
   switch (number) {
     case 0:
       piece_.sum = slope;
@@ -360,6 +305,8 @@ void DriveTrain<Machine, Shaft>::add_events(const AxisCore& core, const AxisStat
   if (dying != 0)
     current_a = end == PieceEnd::kStart ? piece_.current_a : currents(core, state, piece_.stage, at);
   add_electrical(dying, current_a, at, piece_.corner, values);
+  if (!piece_.has_switching) return;
+  add_switching(core, state, end == PieceEnd::kStart ? piece_.from : piece_.stage, at, values);
 }
 
 template <class Machine, class Shaft>
@@ -367,6 +314,7 @@ void DriveTrain<Machine, Shaft>::close(AxisCore& core, AxisState& state, double 
                                        const RotorMotion& from, const RotorMotion& to, int event) noexcept {
   const RotorMotion end = turned(to);
   if (event >= 0) settle_terminals(core, state, piece_.stage, end, event);
+  if (piece_.watched && event >= first_break_event()) pull_break(core, state, start_s + duration_s);
   keep_open(core, state, piece_.stage, end);
   finish_piece(core, state, {start_s, duration_s, piece_.from, piece_.stage, turned(from), end});
   piece_.current_a = currents(core, state, piece_.stage, end);

@@ -73,7 +73,7 @@ template <class Machine, class Shaft>
 PhaseValues DriveTrain<Machine, Shaft>::end_voltages(const AxisCore& core, const AxisState& state,
                                                      const State& x,
                                                      const RotorMotion& motion) const noexcept {
-  if (piece_.plain) return piece_.circuit.start_v;
+  if (piece_.plain) return piece_.switch_ohm != 0.0 ? piece_.circuit.end_v : piece_.circuit.start_v;
   if (state.open_terminals == 0) return piece_.circuit.end_v;
   if (piece_.open) {
     return open_terminal_voltages(core.connection, open_v(x, motion), piece_.drive.field_v);
@@ -90,10 +90,13 @@ template <class Machine, class Shaft>
 void DriveTrain<Machine, Shaft>::connect_piece(AxisCore& core, AxisState& state, double start_s,
                                                double duration_s, const State& x,
                                                const RotorMotion& motion) noexcept {
-  if (piece_.stays && (piece_.plain || leave_open(core, x, motion))) return;
+  if (piece_.stays && !piece_.has_switching && (piece_.plain || leave_open(core, x, motion))) return;
   if (piece_.plain && core.drive.only_switches(state.drive)) {
     core.drive.switch_terminals(state.drive, start_s, piece_.drive);
-    if (conduct(core, state)) return;
+    if (conduct(core, state)) {
+      if (core.breaks) watch_switching(core, state);
+      return;
+    }
   }
   piece_.drive = core.drive.at(state.drive, start_s, duration_s, piece_.current_a);
   const TerminalSet all = all_terminals(core.connection);
@@ -121,6 +124,13 @@ void DriveTrain<Machine, Shaft>::connect_piece(AxisCore& core, AxisState& state,
     if (piece_.circuit.short_circuit) trip(core, state);
     piece_.off = state.open_terminals;
   }
+  piece_.switch_ohm = sound ? piece_.drive.switch_ohm : 0.0;
+  piece_.connection = core.connection;
+  if (core.breaks || piece_.drive.diode_v > 0.0) {
+    watch_switching(core, state);
+  } else {
+    piece_.has_switching = piece_.watched = false;
+  }
 }
 
 template <class Machine, class Shaft>
@@ -128,6 +138,10 @@ PhaseValues DriveTrain<Machine, Shaft>::within_piece_v(const AxisCore& core, Ter
                                                        const State& x, const RotorMotion& motion,
                                                        const PhaseValues& driven_v) const noexcept {
   if (floating == 0) return driven_v;
+  if (piece_.switch_ohm != 0.0 && !piece_.open) {
+    return with_floating(core.connection, floating, driven_v,
+                         floating_v(x, motion, input_behind_switches(core.connection, x, motion)));
+  }
   const TerminalInput& u = piece_.circuit.constant ? piece_.circuit.start : piece_.circuit.end;
   return with_floating(core.connection, floating, driven_v,
                        piece_.open ? open_v(x, motion) : floating_v(x, motion, u));
@@ -153,7 +167,7 @@ RotorMotion DriveTrain<Machine, Shaft>::middle_motion(const Passed& passed) cons
 template <class Machine, class Shaft>
 PhaseValues DriveTrain<Machine, Shaft>::middle_v() const noexcept {
   const TerminalCircuit& circuit = piece_.circuit;
-  if (circuit.constant) return circuit.start_v;
+  if (circuit.constant) return piece_.switch_ohm != 0.0 ? circuit.mean_v : circuit.start_v;
   const auto middle = [](double start, double mean, double end) noexcept {
     return 0.25 * (6.0 * mean - start - end);
   };
@@ -174,7 +188,7 @@ void DriveTrain<Machine, Shaft>::follow_terminals(const AxisCore& core, AxisStat
   const auto against_rail = [&](const ThreePhase& v, TerminalSet afloat) noexcept {
     const ThreePhase result = existing(by_phase(above, v), terminal_count(core.connection));
     const bool open_star = core.connection == Connection::kStar && afloat == all_terminals(core.connection);
-    return open_star ? within_rails(result, 2.0 * rail_v) : result;
+    return open_star ? within_rails(result, 2.0 * rail_v, piece_.drive.diode_v) : result;
   };
   const PhaseValues& first_v = piece_.circuit.start_v;
   const PhaseValues last_v =
@@ -191,7 +205,8 @@ void DriveTrain<Machine, Shaft>::follow_terminals(const AxisCore& core, AxisStat
   }
   if (!core.comparators.enabled()) return;
   const PhaseValues half_v =
-      within_piece_v(core, floating, middle_of(passed), middle_motion(passed), middle_v());
+      floating == 0 ? middle_v()
+                    : within_piece_v(core, floating, middle_of(passed), middle_motion(passed), middle_v());
   core.comparators.follow(state.comparators, core.tick, passed.start_s, passed.duration_s,
                           {.start_v = against_rail(phases_of(first_v), floating),
                            .middle_v = against_rail(phases_of(half_v), floating),

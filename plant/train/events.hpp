@@ -9,9 +9,9 @@
 namespace drivebench {
 
 /// Numbers whose passing through zero ends a piece of a tick: at most four of the shaft, and of each machine
-/// on it three of the terminals and a corner.
+/// on it three of the terminals, a corner and three currents at the limit of the break input.
 struct EventValues {
-  std::array<double, 12> value;  ///< the first `count` of them
+  std::array<double, 18> value;  ///< the first `count` of them
   int shaft = 0;                 ///< number of them that belong to the shaft; the rest follows
   int count = 0;
 

@@ -79,7 +79,7 @@ SharedAmplifier::SharedAmplifier(const Side& first, const Side& second, const Ph
   InjectedFaults faults = first.state.injected;
   faults.open_phase = 0.0;  // a wire of the first machine, not of the second
   drive_.begin_tick(memory_, command, faults, tick);
-  if ((first.state.faults & kOverCurrentTrip) != 0) drive_.switch_off(memory_);
+  if ((first.state.faults & kGatesOffFaults) != 0) drive_.switch_off(memory_);
   first_.state.drive.switched_off = second_.state.drive.switched_off = 0.0;
 }
 
@@ -98,11 +98,11 @@ void SharedAmplifier::run_both(const TerminalDrive& out, double start_s, double 
 
 /// The trip of one machine, by its currents or by a short, is that of both: the amplifier switches off.
 void SharedAmplifier::share_trip() noexcept {
-  const std::uint64_t trip = (first_.state.faults | second_.state.faults) & (kOverCurrent | kOverCurrentTrip);
+  const std::uint64_t trip = (first_.state.faults | second_.state.faults) & (kOverCurrent | kGatesOffFaults);
   first_.state.faults |= trip;
   second_.state.faults |= trip;
   first_.state.drive.switched_off = second_.state.drive.switched_off = 0.0;
-  if ((trip & kOverCurrentTrip) != 0) drive_.switch_off(memory_);
+  if ((trip & kGatesOffFaults) != 0) drive_.switch_off(memory_);
 }
 
 void SharedAmplifier::run_piece(double start_s, double end_s) noexcept {
@@ -258,12 +258,21 @@ bool SharedAmplifier::clamp_one(TerminalDrive& out, TerminalSet& floating) const
   return false;
 }
 
+/// The fault line pulls the break inputs of both.
+double SharedAmplifier::break_stop_s(double start_s, double end_s) noexcept {
+  for (Side* const side : {&first_, &second_})
+    meet_break(side->core, side->state, start_s, {});
+  share_trip();
+  return std::min({end_s, first_.state.break_input.opens_s(), second_.state.break_input.opens_s()});
+}
+
 void SharedAmplifier::run() noexcept {
   const AxisCore& core = first_.core;
   for (int n = 0; n < core.timing.substeps; ++n) {
     const double end_s = (n + 1) * core.step_s;
     for (double start_s = n * core.step_s; start_s < end_s;) {
-      const double stop_s = std::min(end_s, drive_.next_edge_s(memory_, start_s));
+      const double edge_s = std::min(end_s, drive_.next_edge_s(memory_, start_s));
+      const double stop_s = core.breaks ? break_stop_s(start_s, edge_s) : edge_s;
       run_piece(start_s, stop_s);
       share_trip();
       start_s = stop_s;

@@ -54,6 +54,8 @@ class SharedAmplifier {
   PhaseValues try_piece(const TerminalDrive& out, const Undriven& piece, double end_s) noexcept;
   bool clamp_one(TerminalDrive& out, TerminalSet& floating) const noexcept;
   void share_trip() noexcept;
+  /// Lets legs open that are to open now. Where they open next, if that is before end_s.
+  double break_stop_s(double start_s, double end_s) noexcept;
   PhaseValues total_a() const noexcept;
   TerminalSet terminals() const noexcept { return all_terminals(first_.core.connection); }
 

@@ -119,7 +119,11 @@ template <class Shaft>
 void SharedShaft::run_piece(Shaft& x, double start_s, double end_s, double load_nm) noexcept {
   Freed freed;
   for (std::size_t events = 0; start_s < end_s; ++events) {
-    const double duration_s = end_s - start_s;
+    meet_break_of(first_, start_s, first_motion(x));
+    meet_break_of(second_, start_s, second_motion(x));
+    const double stop_s = piece_stop_s(first_.core, first_.state, start_s,
+                                       piece_stop_s(second_.core, second_.state, start_s, end_s));
+    const double duration_s = stop_s - start_s;
     x = locked(first_.core.shaft, x, is_blocked(first_), is_blocked(second_));
     const Shaft from = x;
     first_.train.open(first_.core, first_.state, start_s, duration_s, first_motion(from));
@@ -134,8 +138,15 @@ void SharedShaft::run_piece(Shaft& x, double start_s, double end_s, double load_
                        cut.first_event);
     second_.train.close(second_.core, second_.state, start_s, passed_s, second_motion(from), second_motion(x),
                         cut.second_event);
-    start_s = cut.fraction < 1.0 ? start_s + passed_s : end_s;
+    start_s = cut.fraction < 1.0 ? start_s + passed_s : stop_s;
   }
+}
+
+void SharedShaft::meet_break_of(Side& side, double now_s, const RotorMotion& motion) noexcept {
+  if (!side.core.breaks) return;
+  const WindingValues current_a = side.train.truth(side.state, motion).current_a;
+  meet_break(side.core, side.state, now_s,
+             terminal_currents(side.core.connection, current_a, side.state.open_terminals));
 }
 
 void SharedShaft::check_currents(Side& side, const RotorMotion& motion) noexcept {

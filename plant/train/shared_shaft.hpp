@@ -54,6 +54,7 @@ class SharedShaft {
   template <class Shaft>
   RotorMotion second_motion(const Shaft& x) const noexcept;
   static bool is_blocked(const Side& side) noexcept { return side.state.injected.blocked_rotor != 0.0; }
+  static void meet_break_of(Side& side, double now_s, const RotorMotion& motion) noexcept;
   static void check_currents(Side& side, const RotorMotion& motion) noexcept;
 
   Side first_;

@@ -9,6 +9,7 @@
 
 #include "plant/axis_parameters.hpp"
 #include "plant/axis_state.hpp"
+#include "plant/faults.hpp"
 #include "plant/train/events.hpp"
 
 namespace drivebench {
@@ -29,11 +30,13 @@ struct AxisCore {
   Drive drive;
   SensorBank sensors;
   Comparators comparators;
+  Shunts shunts;
   Encoder encoder;
   ShaftConstants shaft;
   bool shaft_has_events;
   Tick tick = 0;        ///< that is running
   bool follows = true;  ///< in this tick drive, sensors or thermal model need every piece
+  bool breaks = false;  ///< in this tick the break input may open the legs
   std::array<AngleSegment, kMaxSegments> segments{};
   std::size_t segment_count = 0;
   std::int64_t last_tick_turn = 0;
@@ -104,6 +107,27 @@ bool has_impedance(const DriveParameters& p) noexcept;
 
 /// Over-current: the fault bits, and with amplifier.over_current_trip the gates off.
 void trip(AxisCore& core, AxisState& state) noexcept;
+
+/// Whether a current may pull the break input now.
+inline bool watches_break(const AxisCore& core, const AxisState& state) noexcept {
+  return core.p.drive.inverter.break_current_a > 0.0 && state.break_input.pending == 0 &&
+         (state.faults & kBreakInput) == 0;
+}
+
+/// The break input is pulled at this instant of the tick.
+void pull_break(const AxisCore& core, AxisState& state, double now_s) noexcept;
+
+/// At the start of each piece where AxisCore::breaks: a current beyond the limit pulls the break input, and
+/// the legs open if their time has come. Whether they have opened.
+bool meet_break(AxisCore& core, AxisState& state, double now_s, const PhaseValues& current_a) noexcept;
+
+/// The end of a piece that is to go from start_s to end_s: where legs open or currents are converted, if
+/// that is before.
+inline double piece_stop_s(const AxisCore& core, const AxisState& state, double start_s,
+                           double end_s) noexcept {
+  const double stop_s = core.shunts.used() ? core.shunts.stop_s(start_s, end_s) : end_s;
+  return core.breaks && state.break_input.opens_s() < stop_s ? state.break_input.due_s : stop_s;
+}
 
 /// After each substep: over-current faults and the trip. Whether there was one.
 inline bool check_over_current(AxisCore& core, AxisState& state, const PhaseValues& current_a) noexcept {

@@ -183,7 +183,12 @@ Refused Bench::clear_faults(AxisRuntime& a, Owner owner) noexcept {
   if (faults == 0) return Refused::kNot;
   const double limit_a = a.axis.parameters().drive.amplifier.over_current_a;
   const bool over_current = (faults & kOverCurrentTrip) != 0 && largest_current_a(a) > limit_a;
-  if (over_current || c.bad_values != 0 || a.axis.injected().command_loss != 0.0) return Refused::kCauseLasts;
+  const double break_a = a.axis.parameters().drive.inverter.break_current_a;
+  const bool pulled =
+      a.axis.injected().gate_driver_fault != 0.0 || (break_a > 0.0 && largest_current_a(a) > break_a);
+  const bool broken = (faults & kBreakInput) != 0 && pulled;
+  if (over_current || broken || c.bad_values != 0 || a.axis.injected().command_loss != 0.0)
+    return Refused::kCauseLasts;
   a.axis.clear_faults();
   if (a.feeds != 0) axes_[a.feeds].axis.clear_faults();
   c.state = ControlState::kIdle;

@@ -73,15 +73,19 @@ inline constexpr auto kLaterWords<Sample> = [] {
 template <>
 inline constexpr auto kLaterWords<AxisState> = [] {
   constexpr std::size_t kCommands = std::tuple_size_v<decltype(DriveMemory::commands)>;
-  std::array<WordRange, kCommands + 2> ranges{};
+  std::array<WordRange, kCommands + 5> ranges{};
   for (std::size_t n = 0; n < kCommands; ++n) {
     ranges[n] = edges_of_command_at(offsetof(AxisState, drive) + offsetof(DriveMemory, commands) +
                                     n * sizeof(PhaseCommand));
   }
-  ranges[kCommands] = {.first = offsetof(AxisState, terminal_v) / 8,
-                       .count = (offsetof(AxisState, comparators) - offsetof(AxisState, terminal_v)) / 8};
-  ranges[kCommands + 1] = {.first = offsetof(AxisState, comparators) / 8,
+  constexpr std::size_t kGateDriver = offsetof(InjectedFaults, gate_driver_fault);
+  ranges[kCommands] = {.first = (offsetof(AxisState, injected) + kGateDriver) / 8, .count = 1};
+  ranges[kCommands + 1] = {.first = offsetof(AxisState, terminal_v) / 8,
+                           .count = (offsetof(AxisState, comparators) - offsetof(AxisState, terminal_v)) / 8};
+  ranges[kCommands + 2] = {.first = offsetof(AxisState, comparators) / 8,
                            .count = sizeof(ComparatorMemory) / 8};
+  ranges[kCommands + 3] = {.first = offsetof(AxisState, break_input) / 8, .count = sizeof(BreakMemory) / 8};
+  ranges[kCommands + 4] = {.first = offsetof(AxisState, shunts) / 8, .count = sizeof(ShuntMemory) / 8};
   return ranges;
 }();
 

@@ -75,6 +75,33 @@ TEST(Converters, TheTimerWrapsAndTheCaptureHoldsItsLargestNumber) {
   EXPECT_EQ(Encoder(p, 1e-4).timer({.count = -1}), 4'294'967'295u);
 }
 
+// 10 kohm at 25 degrees and B = 3435 K under 10 kohm: half of the range at 25 degrees, at 100 degrees
+// R = 10 kohm exp(3435 (1/373.15 - 1/298.15)) = 987 ohm, and the number falls with the heat. Catches: a
+// thermistor on the other side of the divider, B with the other sign, a number of the linear converter, one
+// beyond its bits.
+TEST(Converters, AThermistorGivesTheNumberOfItsDivider) {
+  const NtcParameters ntc{.ohm = 10e3, .beta_k = 3435.0, .pull_ohm = 10e3};
+  EXPECT_EQ(ntc_count(ntc, 298.15, 12), 2048u);
+  const double hot_ohm = 10e3 * std::exp(3435.0 * (1.0 / 373.15 - 1.0 / 298.15));
+  EXPECT_EQ(ntc_count(ntc, 373.15, 12), static_cast<std::uint64_t>(4096.0 * hot_ohm / (hot_ohm + 10e3)));
+  EXPECT_EQ(ntc_count(ntc, -5.0, 12), 4095u);
+  EXPECT_LT(ntc_count(ntc, 1e6, 12), 10u);
+  AxisParameters p = counted_axis();
+  p.sensors.ntc = ntc;
+  p.sensors.temperature = {.enabled = true, .bits = 12, .full_scale = 500.0};
+  p.thermal.ambient_k = 298.15;
+  EXPECT_TRUE(problems(p).empty());
+  const Axis axis(p, kServoTiming, 1, 0);
+  EXPECT_EQ(axis.sample(0).temperature_counts, 2048u);
+  EXPECT_NEAR(axis.sample(0).temperature_k, 298.15, 0.2);
+  p.sensors.ntc.pull_ohm = 0.0;
+  p.sensors.counts = false;
+  const std::vector<Problem> found = problems(p);
+  ASSERT_EQ(found.size(), 2u);
+  EXPECT_EQ(found[0].field, "temperature_sensor.ntc_ohm");
+  EXPECT_EQ(found[1].field, "temperature_sensor.ntc_ohm");
+}
+
 // Catches: a switch that does nothing because no converter has bits, a capture without a timer.
 TEST(Converters, TheRulesNameWhatIsMissing) {
   const auto has_rule = [](const AxisParameters& p, std::string_view field) {

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "plant/parameters/drive_rows.hpp"
+#include "plant/parameters/later_rows.hpp"
 #include "protocols/text.hpp"
 
 namespace drivebench {
@@ -61,6 +62,7 @@ void check_step(StrictTable& bench, const BenchSetup& setup, const AxisReading& 
   std::vector<Problem> found;
   Problems rules(found);
   add_period_problems(axis.setup.parameters.drive, period_s, rules);
+  add_period_problems(axis.setup.parameters.sensors, period_s, rules);
   for (const Problem& problem : found) {
     bench.report("period_us",
                  "does not suit axis \"" + axis.config.name + "\": " + problem.field + " " + problem.rule);

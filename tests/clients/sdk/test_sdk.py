@@ -95,6 +95,23 @@ class Sdk(unittest.TestCase):
             self.assertEqual(said[0], other)
         self.assertEqual(replay.returncode, 0, replay.stdout + replay.stderr)
 
+    # The same firmware on the parts of a board: R_ds(on), diodes, shunts, break input. Catches: a key that the bench in process, the
+    # server or a replay leaves out, diodes that take no voltage, a break input that trips in a run that is sound.
+    def test_the_parts_of_a_board_are_the_same_over_every_way(self):
+        text = (BENCHES / "esc-board.toml").read_text(encoding="utf-8").replace("../motors", MOTORS)
+        with tempfile.TemporaryDirectory() as folder:
+            path, recording = f"{folder}/bench.sock", f"{folder}/run.mcap"
+            said = run_of(SIX_STEP, "inproc:esc-board")
+            with Server("--unix", path, "--record", recording, text=text) as server:
+                self.assertEqual(said, run_of(SIX_STEP, f"shm:{path}"))
+                server.stop()
+            replay = subprocess.run([SERVER, "--replay", recording], capture_output=True, text=True, timeout=PATIENCE_S, check=False)
+        self.assertEqual(replay.returncode, 0, replay.stdout + replay.stderr)
+        before, lowest, after = map(int, re.match(r"(\d+) rpm before the load step, at least (\d+) after it, (\d+) at the end", said).groups())
+        self.assertLess(abs(before - 0.8 * 900 * 14.8), 60, said)
+        self.assertLess(lowest, before - 30, said)
+        self.assertLess(abs(after - before), 30, said)
+
     # Catches: a set-point that a bus rounds although it need not, a tick that it costs, an axis with another number.
     def test_field_buses_move_the_motor_as_the_bench_in_process_does(self):
         port = free_udp_port()

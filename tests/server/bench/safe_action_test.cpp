@@ -239,5 +239,31 @@ TEST(SafeAction, CMD_04_AFaultIsNotClearedWhileItsCauseLasts) {
   EXPECT_EQ(submit_clear(bench, kOwner), Refused::kNot);
 }
 
+// The break input of a drive: its line opens the legs, and a clear is refused while it is pulled. Catches: a
+// latch that a command undoes, a state of the axis that goes on running, a clear that trips at once again.
+TEST(SafeAction, TheFaultLineOfTheGateDriverHoldsItsLatch) {
+  const std::size_t line = find_injectable_fault("gate_driver_fault");
+  const auto pull = [line](Bench& bench, double value) {
+    bench.submit({.axis = 0, .owner = 0, .action = InjectFault{static_cast<std::uint32_t>(line), value}});
+  };
+  Bench bench = owned_bench(servo_setup(), kOwner);
+  submit_volts(bench, kOwner, 5.0);
+  bench.step();
+  pull(bench, 1.0);
+  submit_volts(bench, kOwner, 5.0);
+  bench.step();
+  EXPECT_EQ(bench.sample(0).faults, kBreakInput);
+  EXPECT_EQ(submit_volts(bench, kOwner, 5.0), Refused::kLatched);
+  EXPECT_EQ(submit_clear(bench, kOwner), Refused::kCauseLasts);
+  bench.step();
+  EXPECT_EQ(state_of(bench), ControlState::kFault);
+  pull(bench, 0.0);
+  EXPECT_EQ(submit_clear(bench, kOwner), Refused::kNot);
+  submit_volts(bench, kOwner, 5.0);
+  bench.step();
+  EXPECT_EQ(bench.sample(0).faults, 0u);
+  EXPECT_EQ(bench.sample(0).u_a_v, 5.0);
+}
+
 }  // namespace
 }  // namespace drivebench

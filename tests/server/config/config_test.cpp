@@ -145,6 +145,22 @@ BenchConfig bench_with_star() {
   return config;
 }
 
+/// That star on the parts of a board.
+BenchConfig bench_with_board() {
+  BenchConfig config = bench_with_star();
+  AxisParameters& p = config.setup.axes[0].parameters;
+  p.drive.kind = DriveKind::kSwitched;
+  p.drive.amplifier.filter_hz = 0.0;
+  p.sensors.current.filter_hz = 0.0;
+  p.sensors.current.delay_ticks = 0.0;
+  p.sensors.shunts = {.sample_s = 10e-6, .conversion_s = 1e-6};
+  p.sensors.counts = true;
+  p.sensors.temperature.enabled = true;
+  p.sensors.temperature.bits = 12;
+  p.sensors.ntc = {.ohm = 10e3, .beta_k = 3435.0, .pull_ohm = 10e3};
+  return config;
+}
+
 /// The same behind a transformer, whose values mean nothing alone.
 BenchConfig bench_with_transformer() {
   BenchConfig config = bench_with_room();
@@ -175,10 +191,16 @@ TEST(Config, EveryRowOfTheParameterTableHasAKeyOfItsOwn) {
   const BenchConfig room = bench_with_room();
   const BenchConfig transformer = bench_with_transformer();
   const BenchConfig star = bench_with_star();
+  const BenchConfig board = bench_with_board();
+  const auto is_of_board = [](const Parameter& row) {
+    return row.later && (row.name.starts_with("inverter.") || row.name.starts_with("current_sensor.") ||
+                         row.name.starts_with("temperature_sensor."));
+  };
   std::string alone;
   for (const Parameter& row : axis_parameters(room.setup.axes[0].parameters)) {
     const BenchConfig& base = row.name.starts_with("transformer.")  ? transformer
                               : row.name.starts_with("comparator.") ? star
+                              : is_of_board(row)                    ? board
                                                                     : room;
     if (const auto config = with_another_value(base, row)) {
       expect_equal(parse(to_toml(*config)), *config);

@@ -1,0 +1,111 @@
+#pragma once
+
+#include "plant/drive/phases.hpp"
+#include "plant/train/drive_train.hpp"
+
+// Switches and diodes that take a voltage, and the break input of a drive train.
+namespace drivebench {
+
+template <class Machine, class Shaft>
+void DriveTrain<Machine, Shaft>::watch_switching(const AxisCore& core, const AxisState& state) noexcept {
+  piece_.turning_on = 0;
+  piece_.floats_alone = false;
+  if (piece_.drive.diode_v > 0.0) {
+    for (int k = 0; k < terminal_count(core.connection); ++k) {
+      const bool diodes = piece_.drive.mode[static_cast<std::size_t>(k)] == TerminalMode::kDiodes;
+      if (diodes && (piece_.off & terminal_bit(k)) != 0) piece_.turning_on |= terminal_bit(k);
+    }
+    piece_.floats_alone =
+        core.connection == Connection::kStar && piece_.turning_on != 0 &&
+        (piece_.off & ~driven_terminals(core.connection, piece_.drive)) == all_terminals(core.connection);
+  }
+  piece_.watched = core.breaks && watches_break(core, state);
+  piece_.has_switching = piece_.turning_on != 0 || piece_.watched;
+}
+
+template <class Machine, class Shaft>
+TerminalInput DriveTrain<Machine, Shaft>::input_behind_switches(Connection connection, const State& x,
+                                                                const RotorMotion& motion) const noexcept {
+  TerminalInput u = piece_.circuit.start;
+  const PhaseValues current_a = terminal_currents(connection, winding_currents(c_, x, motion), piece_.off);
+  const PhaseValues taken_v = behind_switches(connection, piece_.drive, {}, current_a);
+  const WindingVoltages across = winding_voltages(connection, phases_of(taken_v));
+  u.voltage_v = {.a = u.voltage_v.a + across.stator_v.a, .b = u.voltage_v.b + across.stator_v.b};
+  u.zero_v += across.zero_v;
+  return u;
+}
+
+template <class Machine, class Shaft>
+void DriveTrain<Machine, Shaft>::step_behind_switches(const AxisCore& core, Whole& x, double duration_s,
+                                                      const ShaftBranch& branch,
+                                                      double load_nm) const noexcept {
+  x = rk4_step(x, duration_s, [&](const Whole& s) noexcept -> Whole {
+    return slope(core, s, input_behind_switches(core.connection, s.machine, motion_of(s)), branch, load_nm);
+  });
+}
+
+/// A current goes nearly linearly within a piece; between the ends of a piece it is taken so for the mean.
+template <class Machine, class Shaft>
+void DriveTrain<Machine, Shaft>::take_switch_voltages(Connection connection, const PhaseValues& from_a,
+                                                      const PhaseValues& to_a) noexcept {
+  TerminalCircuit& circuit = piece_.circuit;
+  const TerminalSet driven = driven_terminals(connection, piece_.drive);
+  if ((driven & 1u) != 0) circuit.start_v.a = piece_.drive.start_v.a;
+  if ((driven & 2u) != 0) circuit.start_v.b = piece_.drive.start_v.b;
+  if ((driven & 4u) != 0) circuit.start_v.c = piece_.drive.start_v.c;
+  const PhaseValues ideal_v = circuit.start_v;
+  const auto half = [](double x, double y) noexcept { return 0.5 * (x + y); };
+  circuit.start_v = behind_switches(connection, piece_.drive, ideal_v, from_a);
+  circuit.mean_v = behind_switches(connection, piece_.drive, ideal_v, by_terminal(half, from_a, to_a));
+  circuit.end_v = behind_switches(connection, piece_.drive, ideal_v, to_a);
+}
+
+template <class Machine, class Shaft>
+PhaseValues DriveTrain<Machine, Shaft>::floating_within(const AxisCore& core, const State& x,
+                                                        const RotorMotion& motion) const noexcept {
+  if (piece_.floats_alone) return open_terminal_voltages(core.connection, open_v(x, motion), 0.0);
+  const PhaseValues current_a =
+      terminal_currents(core.connection, winding_currents(c_, x, motion), piece_.off);
+  PhaseValues held_v = piece_.circuit.start_v;
+  const TerminalSet driven = driven_terminals(core.connection, piece_.drive);
+  if ((driven & 1u) != 0) held_v.a = piece_.drive.start_v.a;
+  if ((driven & 2u) != 0) held_v.b = piece_.drive.start_v.b;
+  if ((driven & 4u) != 0) held_v.c = piece_.drive.start_v.c;
+  held_v = behind_switches(core.connection, piece_.drive, held_v, current_a);
+  return with_floating(core.connection, piece_.off & ~driven, held_v,
+                       floating_v(x, motion, input_behind_switches(core.connection, x, motion)));
+}
+
+template <class Machine, class Shaft>
+void DriveTrain<Machine, Shaft>::add_switching(const AxisCore& core, const AxisState& state, const State& x,
+                                               const RotorMotion& motion,
+                                               EventValues& values) const noexcept {
+  const double clamp_v = piece_.drive.clamp_v();
+  if (piece_.turning_on != 0) {
+    ThreePhase v = phases_of(floating_within(core, x, motion));
+    double highest_v = -1e300;
+    double lowest_v = 1e300;
+    for (int k = 0; k < 3; ++k) {
+      if ((piece_.turning_on & terminal_bit(k)) == 0) continue;
+      highest_v = std::max(highest_v, phase(v, k));
+      lowest_v = std::min(lowest_v, phase(v, k));
+      if (!piece_.floats_alone) values.add(clamp_v - std::abs(phase(v, k)));
+    }
+    if (piece_.floats_alone) values.add(2.0 * clamp_v - (highest_v - lowest_v));
+  }
+  if (!piece_.watched) return;
+  const double limit_a = core.p.drive.inverter.break_current_a;
+  const PhaseValues current_a = currents(core, state, x, motion);
+  values.add(limit_a - std::abs(current_a.a));
+  values.add(limit_a - std::abs(current_a.b));
+  values.add(limit_a - std::abs(current_a.c));
+}
+
+template <class Machine, class Shaft>
+int DriveTrain<Machine, Shaft>::first_break_event() const noexcept {
+  const bool corner = Machine::kHasCorners && piece_.corner != kNoCorner;
+  return std::popcount(piece_.circuit.dying) + (corner ? 1 : 0) +
+         (piece_.floats_alone ? 1 : std::popcount(piece_.turning_on));
+}
+
+}  // namespace drivebench
