@@ -63,8 +63,7 @@ namespace {
 std::string latched_names(std::uint64_t latched) {
   std::string names;
   for (const FaultInfo& fault : kFaultTable) {
-    if ((latched & fault.bit) != 0)
-      names.append(names.empty() ? ": " : " ").append(fault.name);
+    if ((latched & fault.bit) != 0) names.append(names.empty() ? ": " : " ").append(fault.name);
   }
   return names;
 }

@@ -14,7 +14,7 @@ struct Verdict {
   std::uint64_t ticks = 0;
   std::uint64_t late_ticks = 0;
   OctaveHistogram lateness{};  ///< empty outside real time
-  std::uint64_t gaps = 0;    ///< entries that the recorder lost
+  std::uint64_t gaps = 0;      ///< entries that the recorder lost
   std::uint64_t state_hash = 0;
   std::string recording{};  ///< its first file that is there; empty: none
   std::string remarks{};    ///< damage that disks and other programs have done to its files

@@ -205,8 +205,8 @@ class Predictor : public Flow<Model> {
     return sum;
   }
 
-  /// While the encoder shows its first count the error of that is one error: all these samples tell as much of
-  /// the angle as one does, and of the speed that the shaft has not moved by a count.
+  /// While the encoder shows its first count the error of that is one error: all these samples tell as much
+  /// of the angle as one does, and of the speed that the shaft has not moved by a count.
   SensorNoise noise_at(std::size_t n, SensorNoise noise) const noexcept {
     if (n < r_.still) noise.angle_rad *= std::sqrt(static_cast<double>(r_.still));
     return noise;

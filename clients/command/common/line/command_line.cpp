@@ -79,7 +79,8 @@ int CommandLine::fail(int code, std::string_view kind, std::string_view message,
 
 void add_link(CLI::App& sub, LinkChoice& link, const std::string& links) {
   add_link_with_help(sub, link, "address of the bench: " + links + "; else from DRIVEBENCH_LINK");
-  sub.get_option("--link")->default_str(LinkChoice{}.address);  // of man pages, too, wherever they are written
+  sub.get_option("--link")->default_str(
+      LinkChoice{}.address);  // of man pages, too, wherever they are written
 }
 
 void add_link_with_help(CLI::App& sub, LinkChoice& link, const std::string& help) {
