@@ -14,8 +14,8 @@ namespace drivebench::simulator {
 class History {
  public:
   void add(const Sample& s) { ring_[s.tick % kSize] = s; }
-  /// Whether it equals the sample of its tick; true of ticks before the history. A status names the present
-  /// owner, which in lockstep may be newer than the sample.
+  /// Whether it equals the sample of its tick; true of ticks before the history. A status has the owner, the
+  /// state and the latched faults of now, which in lockstep may be newer than the sample.
   bool agrees(const v1::Sample& told, bool in_status) const;
 
  private:
