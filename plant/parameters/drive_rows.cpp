@@ -68,7 +68,7 @@ constexpr auto kTable = std::to_array<Parameter>({
                                      "both switches of a leg are open so long at each commutation"),
     inverter<&Inverter::dead_time_band_a>(
         "inverter.dead_time_band_a", "A",
-        1e-9, 1e6, kLive, "averaged inverter: current below which the dead-time error goes to zero linearly"),
+        1e-9, 1e6, kLive, "averaged inverter: below it the dead-time error goes to zero linearly"),
 
     bus<&Bus::voltage_v>("bus.voltage_v", "V", 0, 1e6, kLive,
                          "supply of the DC link; 0: amplifier.voltage_limit_v, twice that in a star"),
@@ -81,9 +81,9 @@ constexpr auto kTable = std::to_array<Parameter>({
                              "link voltage below which it is off again"),
     bus<&Bus::chopper_ohm>("bus.chopper_ohm", "ohm", 1e-6, 1e6, kLive, "brake resistor"),
 
-    choice(source<&Source::waveform>("source.waveform", "1", 0, 0, kInteger,
-                                     "sine: cos(phase); trapezoid: flat tops of 120 degrees; table: "
-                                     "source.table over the fraction of a period"),
+    choice(source<&Source::waveform>(
+               "source.waveform", "1", 0, 0, kInteger,
+               "sine; trapezoid: flat tops of 120 degrees; table: source.table over a period"),
            kWaveforms),
     source<&Source::amplitude_v>("source.amplitude_v", "V", 0, 1e6, kLive,
                                  "peak of phase a, terminal to neutral in a star"),

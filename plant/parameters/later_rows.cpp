@@ -31,24 +31,21 @@ using Inverter = InverterParameters;
 constexpr auto kTable = std::to_array<Parameter>({
     row<&AxisParameters::sensors, &SensorParameters::terminals>(
         "voltage_sensor.against_rail", "1", 0, 1, kInteger | kLater,
-        "1: the terminals are shown against the negative rail too, terminal_a_v and so on"),
+        "1: terminals against the negative rail, too: terminal_a_v and so on"),
     row<&AxisParameters::drive, &DriveParameters::bus, &BusParameters::battery>(
-        "bus.battery", "1", 0, 1, kInteger | kLater,
-        "1: the supply of the link takes current back, through its resistance; 0: a rectifier"),
+        "bus.battery", "1", 0, 1, kInteger | kLater, "1: the supply takes current back; 0: a rectifier"),
     comparator_row<&Comparator::enabled>("comparator.enabled", "1", 0, 1, kInteger,
                                          "1: comparators of the terminals, comparator_levels and so on"),
-    choice(
-        comparator_row<&Comparator::reference>(
-            "comparator.reference", "1", 0, 0, kInteger,
-            "what a terminal is compared with: the mean of all three, the middle of the link, reference_v"),
-        kReferences),
+    choice(comparator_row<&Comparator::reference>("comparator.reference", "1", 0, 0, kInteger,
+                                                  "what a terminal is compared with"),
+           kReferences),
     comparator_row<&Comparator::reference_v>("comparator.reference_v", "V", -1e6, 1e6, kLive,
                                              "against the negative rail, with reference = \"fixed\""),
     comparator_row<&Comparator::rc_s>("comparator.rc_s", "s", 0, 1, kLive,
                                       "time constant of the RC of terminal and reference; 0: none"),
     comparator_row<&Comparator::hysteresis_v>(
         "comparator.hysteresis_v", "V", 0, 1e6, kLive,
-        "the level rises above half of it and falls below minus half of it; at the terminal"),
+        "it rises above half of it, falls below minus half; at the terminal"),
     comparator_row<&Comparator::offset_a_v>("comparator.offset_a_v", "V", -1e6, 1e6, kLive,
                                             "added to what the comparator of a sees"),
     comparator_row<&Comparator::offset_b_v>("comparator.offset_b_v", "V", -1e6, 1e6, kLive,
@@ -59,44 +56,35 @@ constexpr auto kTable = std::to_array<Parameter>({
                                              "Gaussian, new each microsecond, in each comparator its own"),
     row<&AxisParameters::sensors, &SensorParameters::counts>(
         "converter.counts", "1", 0, 1, kInteger | kLater,
-        "1: the numbers of the converters are shown, i_a_counts and so on: 2^(bits - 1) for a reading of 0"),
+        "1: converters show their numbers, too: i_a_counts and so on, 2^(bits - 1) for 0"),
     row<&AxisParameters::encoder, &EncoderParameters::timer_bits>(
         "encoder.timer_bits", "bit", 0, 32, kInteger | kLater,
         "of the timers of encoder_timer and encoder_capture; 0: there are none"),
     row<&AxisParameters::encoder, &EncoderParameters::capture_hz>(
         "encoder.capture_hz", "Hz", 0, 1e9, kLater,
-        "clock of the timer that measures the time between edges, encoder_capture; 0: there is none"),
+        "clock of the timer of encoder_capture, between edges; 0: none"),
     inverter<&Inverter::switch_ohm>("inverter.switch_ohm", "ohm", 0, 1e3, kLive | kLater,
-                                    "R_ds(on) of a closed switch of the switched inverter"),
-    inverter<&Inverter::diode_v>(
-        "inverter.diode_v", "V",
-        0, 100, kLive | kLater,
-        "forward voltage of a diode of the switched inverter; above 0 the instant at "
-        "which a diode begins to conduct is located"),
-    inverter<&Inverter::break_current_a>(
-        "inverter.break_current_a", "A",
-        0, 1e6, kLive | kLater,
-        "comparator of the break input: a phase current beyond it opens all legs until cleared; 0: none"),
+                                    "R_ds(on) of a closed switch"),
+    inverter<&Inverter::diode_v>("inverter.diode_v", "V", 0, 100, kLive | kLater,
+                                 "forward voltage of a diode; above 0 its turn-on is located"),
+    inverter<&Inverter::break_current_a>("inverter.break_current_a", "A", 0, 1e6, kLive | kLater,
+                                         "a phase current beyond it opens all legs until cleared; 0: none"),
     inverter<&Inverter::break_delay_s>("inverter.break_delay_s", "s", 0, 1e-2, kLive | kLater,
-                                       "from the comparator or the fault line until the legs are open"),
+                                       "from the cause until the legs are open"),
     choice(shunts<&ShuntParameters::place>(
                "current_sensor.place", "1", 0, 0, kInteger | kLater,
-               "inline: wires of the motor; low_side: lower switch of each leg; link: i_a and i_b are two "
-               "conversions of the current of the link"),
+               "inline: wires; low_side: lower switches; link: i_a and i_b are two conversions of the link"),
            kShuntPlaces),
-    shunts<&ShuntParameters::sample_s>(
-        "current_sensor.sample_s", "s", 0, 1, kLater,
-        "instant of the first conversion in the tick that leads to the sample; 0: at its end"),
+    shunts<&ShuntParameters::sample_s>("current_sensor.sample_s", "s", 0, 1, kLater,
+                                       "first conversion, in the tick before the sample; 0: at its end"),
     shunts<&ShuntParameters::conversion_s>("current_sensor.conversion_s", "s", 0, 1, kLater,
                                            "from one conversion to the next; 0: all at once"),
-    ntc<&NtcParameters::ohm>(
-        "temperature_sensor.ntc_ohm", "ohm", 0, 1e9, kLater,
-        "thermistor at 25 degrees Celsius, of which temperature_counts is the divider's; 0: "
-        "none, linear in kelvin"),
+    ntc<&NtcParameters::ohm>("temperature_sensor.ntc_ohm", "ohm", 0, 1e9, kLater,
+                             "thermistor at 25 degrees Celsius, for temperature_counts; 0: none"),
     ntc<&NtcParameters::beta_k>("temperature_sensor.ntc_beta_k", "K", 0, 1e5, kLater,
-                                "B of the thermistor, R = R_25 exp(B (1/T - 1/298.15 K))"),
+                                "B of R = R_25 exp(B (1/T - 1/298.15 K))"),
     ntc<&NtcParameters::pull_ohm>("temperature_sensor.ntc_pull_ohm", "ohm", 0, 1e9, kLater,
-                                  "resistor from the thermistor to the reference of the converter"),
+                                  "resistor to the reference of the converter"),
 });
 
 bool has_bits(const SensorParameters& p) noexcept {

@@ -33,7 +33,7 @@ constexpr auto kTable = std::to_array<Parameter>({
                                        "k of a fan or pump at the output: k w|w| opposes motion"),
     shaft_row<&Shaft::passive_load_nm>(
         "mechanics.passive_load_nm", "N*m", 0, 1e6, kLive,
-        "load at the output that opposes motion and holds at standstill, as a cutter or a brake does"),
+        "opposes motion at the output and holds at standstill, as a brake does"),
     shaft_row<&Shaft::gear_ratio>("mechanics.gear_ratio", "1", 1e-6, 1e6, kReal,
                                   "n: turns of the motor for one of the output; loads act at the output"),
     shaft_row<&Shaft::load_inertia_kgm2>(
@@ -41,9 +41,8 @@ constexpr auto kTable = std::to_array<Parameter>({
         "at the output; m (screw_lead_m/(2 pi))^2 for a table of mass m on a screw"),
     shaft_row<&Shaft::load_viscous_friction_nms>("mechanics.load_viscous_friction_nms", "N*m*s/rad", 0, 1e6,
                                                  kLive, "at the output"),
-    shaft_row<&Shaft::shaft_stiffness_nm>(
-        "mechanics.shaft_stiffness_nm", "N*m/rad", 0, 1e12, kReal,
-        "of the shaft between gear and load_inertia_kgm2; 0: rigid, rotor and load turn as one"),
+    shaft_row<&Shaft::shaft_stiffness_nm>("mechanics.shaft_stiffness_nm", "N*m/rad", 0, 1e12, kReal,
+                                          "of the shaft from gear to load_inertia_kgm2; 0: rigid"),
     shaft_row<&Shaft::shaft_damping_nms>("mechanics.shaft_damping_nms", "N*m*s/rad", 0, 1e9, kLive,
                                          "torque over speed of the twist of an elastic shaft"),
     shaft_row<&Shaft::backlash_rad>("mechanics.backlash_rad", "rad", 0, 6.3, kReal,

@@ -136,16 +136,16 @@ constexpr auto kBusSensor =
                                          .filter_hz = "bus_sensor.filter_hz"},
                                         "V", "1: the DC link is measured; 0: its true voltage is shown");
 
-constexpr auto kTemperatureSensor = analog_rows<&SensorParameters::temperature>(
-    {.enabled = "temperature_sensor.enabled",
-     .bits = "temperature_sensor.bits",
-     .full_scale = "temperature_sensor.full_scale_k",
-     .gain = "temperature_sensor.gain",
-     .offset = "temperature_sensor.offset_k",
-     .noise_rms = "temperature_sensor.noise_rms_k",
-     .delay_ticks = "temperature_sensor.delay_ticks",
-     .filter_hz = "temperature_sensor.filter_hz"},
-    "K", "1: the temperature of the winding (section thermal) is measured");
+constexpr auto kTemperatureSensor =
+    analog_rows<&SensorParameters::temperature>({.enabled = "temperature_sensor.enabled",
+                                                 .bits = "temperature_sensor.bits",
+                                                 .full_scale = "temperature_sensor.full_scale_k",
+                                                 .gain = "temperature_sensor.gain",
+                                                 .offset = "temperature_sensor.offset_k",
+                                                 .noise_rms = "temperature_sensor.noise_rms_k",
+                                                 .delay_ticks = "temperature_sensor.delay_ticks",
+                                                 .filter_hz = "temperature_sensor.filter_hz"},
+                                                "K", "1: the winding's temperature is measured");
 
 constexpr auto kTachometerChannel = analog_rows<&SensorParameters::tachometer, &Tachometer::analog>(
     {.enabled = "tachometer.enabled",
@@ -176,7 +176,7 @@ constexpr auto kResolverChannel = analog_rows<&SensorParameters::resolver, &Reso
      .noise_rms = "resolver.noise_rms_v",
      .delay_ticks = "resolver.delay_ticks",
      .filter_hz = "resolver.filter_hz"},
-    "V", "1: a resolver sits on the rotor; its windings are seen demodulated");
+    "V", "1: a resolver sits on the rotor, seen demodulated");
 
 constexpr auto kResolver = std::to_array<Parameter>({
     sensor_row<&SensorParameters::resolver, &Resolver::pole_pairs>(

@@ -76,7 +76,7 @@ class MadeMotorsRun(NewTest):
         """Catches: the scaling of three phases above the numbers of a motor that has none."""
         self.assertNotIn("two-phase", self.new("motor", "dc", *DC, "--kt", "0.05").stdout)
         self.assertIn("power-invariant:\n# amplitudes times sqrt(3/2), so that power and torque need no factor.\n# Made by: ",
-                      self.new("motor", "pm", *PM, "--kt", "0.5").stdout)
+                      self.new("motor", "pm", *PM, "--kt-rms", "0.5").stdout)
 
     def test_a_dc_motor(self):
         """Catches: a torque constant in other units, friction that is not that of the no-load current. In steady state the
