@@ -13,22 +13,6 @@ namespace {
 // As fine as the shortest time-out of the configuration.
 constexpr auto kTimerPeriod = std::chrono::milliseconds(10);
 
-std::string_view name_of(BusState state) noexcept {
-  switch (state) {
-    case BusState::kUp:
-      return "up";
-    case BusState::kWarning:
-      return "error warning";
-    case BusState::kPassive:
-      return "error passive";
-    case BusState::kDown:
-      return "CAN_DOWN";
-    case BusState::kAbsent:
-      break;
-  }
-  return "CAN_ABSENT";
-}
-
 /// The clock of the stamps may be set back at any time.
 constexpr std::uint64_t not_negative(std::int64_t value) noexcept {
   return value > 0 ? static_cast<std::uint64_t>(value) : 0;
@@ -45,6 +29,22 @@ bool from_bench(const Match& match) noexcept {
 }
 
 }  // namespace
+
+std::string_view name_of(BusState state) noexcept {
+  switch (state) {
+    case BusState::kUp:
+      return "up";
+    case BusState::kWarning:
+      return "error warning";
+    case BusState::kPassive:
+      return "error passive";
+    case BusState::kDown:
+      return "CAN_DOWN";
+    case BusState::kAbsent:
+      break;
+  }
+  return "CAN_ABSENT";
+}
 
 Endpoint::Endpoint(asio::io_context& io, const CanConfig& config, std::unique_ptr<Bus> bus)
     : timer_(io), config_(config), bus_(std::move(bus)) {}

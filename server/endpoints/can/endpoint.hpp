@@ -6,6 +6,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "protocols/can/command.hpp"
@@ -20,6 +21,9 @@
 #include "server/host/asio.hpp"
 
 namespace drivebench::can {
+
+/// As people read it: "up" to "CAN_ABSENT".
+std::string_view name_of(BusState state) noexcept;
 
 /// The native profile on one bus: sends samples, state and heartbeats of every axis, and lets one controller
 /// at a time command each axis. A controller shows its right with the lease number that the bench gave it. No
