@@ -242,9 +242,9 @@ TEST(SafeAction, CMD_04_AFaultIsNotClearedWhileItsCauseLasts) {
 // The break input of a drive: its line opens the legs, and a clear is refused while it is pulled. Catches: a
 // latch that a command undoes, a state of the axis that goes on running, a clear that trips at once again.
 TEST(SafeAction, TheFaultLineOfTheGateDriverHoldsItsLatch) {
-  const std::size_t line = find_injectable_fault("gate_driver_fault");
-  const auto pull = [line](Bench& bench, double value) {
-    bench.submit({.axis = 0, .owner = 0, .action = InjectFault{static_cast<std::uint32_t>(line), value}});
+  constexpr auto kLine = static_cast<std::uint32_t>(find_injectable_fault("gate_driver_fault"));
+  const auto pull = [](Bench& bench, double value) {
+    bench.submit({.axis = 0, .owner = 0, .action = InjectFault{kLine, value}});
   };
   Bench bench = owned_bench(servo_setup(), kOwner);
   submit_volts(bench, kOwner, 5.0);
