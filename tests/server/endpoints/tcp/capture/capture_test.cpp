@@ -155,7 +155,7 @@ TEST_F(CaptureTest, AWindowOfManyBlocksIsInOrder) {
 }
 
 // Catches: an event in the hold-off that fires, one after its end that does not, an end that overflows, an
-// event while the rows are read that nobody is told of or that counts twice.
+// event while the rows are read that is not told, or counts twice.
 TEST_F(CaptureTest, TheHoldOffKeepsEventsAwayAndMissedOnesAreCounted) {
   Capture capture(settings(0, 1, 100), 0, pool_);
   take(capture, 0);
