@@ -160,6 +160,18 @@ TEST(Pages, ErrorsSpeakInTheSameWords) {
   EXPECT_EQ(problems.str(), "--number: its value is missing\nRun with --help for more information.\n");
 }
 
+/// The first line that a program says about a command line that it refuses.
+std::string first_problem(CLI::App& app, const std::string& line) {
+  std::ostringstream out;
+  std::ostringstream problems;
+  try {
+    app.parse(line);
+  } catch (const CLI::ParseError& error) {
+    app.exit(error, out, problems);
+  }
+  return problems.str().substr(0, problems.str().find('\n'));
+}
+
 /// What a tool with one option of each kind says about a line.
 std::string refusal_of(const std::string& line) {
   CLI::App app("tool");
@@ -176,14 +188,7 @@ std::string refusal_of(const std::string& line) {
   app.add_option("--from", whole)->check(not_negative());
   app.add_option("--format", text)->check(CLI::IsMember({"csv", "mat", "candump"}));
   app.add_option("--phases", whole)->check(CLI::IsMember({2, 3}));
-  std::ostringstream out;
-  std::ostringstream problems;
-  try {
-    app.parse(line);
-  } catch (const CLI::ParseError& error) {
-    app.exit(error, out, problems);
-  }
-  return problems.str().substr(0, problems.str().find('\n'));
+  return first_problem(app, line);
 }
 
 // Catches: a limit against overflow told as if it were one of the motor's, a number that is not told as it
@@ -217,14 +222,7 @@ std::string problem_with(const std::string& line) {
   double number = 0.0;
   motor.add_option("--kv-rms", number);
   motor.add_option("--poles", number);
-  std::ostringstream out;
-  std::ostringstream problems;
-  try {
-    app.parse(line);
-  } catch (const CLI::ParseError& error) {
-    app.exit(error, out, problems);
-  }
-  return problems.str().substr(0, problems.str().find('\n'));
+  return first_problem(app, line);
 }
 
 // Catches: CLI11's list of what was left over, in reverse order; a value that is named in the place of its
