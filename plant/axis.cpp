@@ -122,6 +122,7 @@ void Axis::set_parameters(const AxisParameters& p) noexcept {
 
 void Axis::restore(const AxisState& state) noexcept {
   state_ = state;
+  core_.injected_bits = injected_bits(state.injected);
   core_.segment_count = 0;
   adjust();
 }
@@ -143,6 +144,7 @@ void Axis::bump_output(double impulse_nms) noexcept {
 
 void Axis::inject(std::size_t row, double value) noexcept {
   state_.injected.*kInjectableFaults[row].member = value;
+  core_.injected_bits = injected_bits(state_.injected);
   adjust();
 }
 
@@ -301,7 +303,7 @@ Sample Axis::sample(Tick tick) const noexcept {
   Sample s = core_.sensors.readings(state_.sensors, state_.injected, tick);
   s.tick = static_cast<std::uint64_t>(tick);
   s.faults |= state_.faults;
-  s.injected = injected_bits(state_.injected);
+  s.injected = core_.injected_bits;
   s.encoder_count = state_.encoder.count;
   s.encoder_levels = core_.encoder.levels(state_.encoder, state_.injected);
   s.edge_age_s = core_.encoder.edge_age_s(state_.encoder, tick);

@@ -39,6 +39,7 @@ struct AxisCore {
   bool breaks = false;  ///< in this tick the break input may open the legs
   std::array<AngleSegment, kMaxSegments> segments{};
   std::size_t segment_count = 0;
+  std::uint64_t injected_bits = 0;  ///< of the injected faults, as a sample shows them
   std::int64_t last_tick_turn = 0;
   EncoderState last_tick_encoder{};  ///< at its start
 

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
+#include <cstddef>
 #include <utility>
 
 #include "protocols/nearest_name.hpp"
@@ -149,14 +150,20 @@ void Judge::watch_steps(std::span<const Sample> axes) noexcept {
 
 /// Owner and late ticks differ between equal runs.
 void Judge::add_hash(const Sample& sample) noexcept {
-  Sample counted = sample;
-  counted.owner = 0;
-  counted.late_ticks = 0;
-  const auto words = std::bit_cast<std::array<std::uint64_t, sizeof(Sample) / 8>>(counted);
-  std::array<std::uint64_t, 4> lanes = lanes_;
-  for (std::size_t i = 0; i < words.size(); ++i)
-    lanes[i % lanes.size()] = mixed(lanes[i % lanes.size()], words[i]);
-  lanes_ = lanes;
+  auto words = std::bit_cast<std::array<std::uint64_t, sizeof(Sample) / 8>>(sample);
+  words[offsetof(Sample, owner) / 8] = 0;
+  words[offsetof(Sample, late_ticks) / 8] = 0;
+  auto [first, second, third, fourth] = lanes_;  // in registers: four multiplications overlap
+  std::size_t next = 0;
+  for (; next + 4 <= words.size(); next += 4) {
+    first = mixed(first, words[next]);
+    second = mixed(second, words[next + 1]);
+    third = mixed(third, words[next + 2]);
+    fourth = mixed(fourth, words[next + 3]);
+  }
+  lanes_ = {first, second, third, fourth};
+  for (; next < words.size(); ++next)
+    lanes_[next % 4] = mixed(lanes_[next % 4], words[next]);
 }
 
 void Judge::keep(std::span<const Sample> axes) {
