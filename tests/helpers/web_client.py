@@ -18,11 +18,12 @@ BINARY, TEXT, CLOSE, PING, PONG = 2, 1, 8, 9, 10
 
 
 class Gateway:
-    """Ended with the `with` block."""
+    """Ended with the `with` block. `before` is called in its process before it becomes the program."""
 
-    def __init__(self, server, *options, link=None):
+    def __init__(self, server, *options, link=None, before=None):
         command = [DRIVEBENCH, "web", "--listen", "127.0.0.1:0", "--json", "--link", link or link_of(server), *options]
-        self.process = subprocess.Popen([str(word) for word in command], stdout=subprocess.PIPE, text=True, env=environment())
+        self.process = subprocess.Popen([str(word) for word in command], stdout=subprocess.PIPE, text=True, env=environment(),
+                                        preexec_fn=before)
         if not select.select([self.process.stdout], [], [], PATIENCE_S)[0]:
             raise AssertionError("the gateway does not start")
         line = self.process.stdout.readline()

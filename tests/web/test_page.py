@@ -59,6 +59,16 @@ def missing():
     return ""
 
 
+def text_for_users(folder, bench="servo"):
+    """A bench file that knows a viewer, an operator and a conductor."""
+    tokens = folder / "tokens"
+    tokens.write_text(USERS, encoding="utf-8")
+    tokens.chmod(0o600)
+    text = (BENCHES / f"{bench}.toml").read_text(encoding="utf-8").replace("../motors/", f"{REPOSITORY}/configs/motors/")
+    access = f'[tcp]\ntokens_file = "{tokens}"'
+    return text.replace("[tcp]", access) if "[tcp]" in text else f"{text}\n{access}\n"
+
+
 class PageTest(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
@@ -103,13 +113,7 @@ class PageTest(unittest.TestCase):
 
     def for_users(self, *options, bench="servo"):
         """A bench in lockstep that knows a viewer, an operator and a conductor."""
-        tokens = self.folder / "tokens"
-        tokens.write_text(USERS, encoding="utf-8")
-        tokens.chmod(0o600)
-        text = (BENCHES / f"{bench}.toml").read_text(encoding="utf-8").replace("../motors/", f"{REPOSITORY}/configs/motors/")
-        access = f'[tcp]\ntokens_file = "{tokens}"'
-        text = text.replace("[tcp]", access) if "[tcp]" in text else f"{text}\n{access}\n"
-        return self.serve("--mode", "lockstep", *options, text=text)
+        return self.serve("--mode", "lockstep", *options, text=text_for_users(self.folder, bench))
 
 
 class Page(PageTest):

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cstdio>
 #include <cstdlib>
 #include <optional>
 #include <stdexcept>
@@ -184,6 +185,7 @@ void run_missing(Work& work, const TestOptions& options, const StoredResults* st
     progress.update(static_cast<double>(ended) / static_cast<double>(prepared.size()),
                     fmt::format("{} of {} cases", ended, prepared.size()));
     if (!options.tap) fmt::print("{}{}", regression::table_row(result), rerun_line(result, options));
+    std::fflush(stdout);  // a pipe, too, tells each case as it ends
     if (result.timing) timing.add(result.name, *result.timing);
   };
   std::vector<CaseResult> made = run_suite(prepared, folder.path(), settings_of(options, work, stored), see);

@@ -8,6 +8,7 @@
 #include "clients/command/common/basics/errors.hpp"
 #include "clients/command/common/basics/json.hpp"
 #include "clients/command/common/programs/installation.hpp"
+#include "clients/command/web/child_verb.hpp"
 #include "clients/web/gateway/gateway.hpp"
 #include "protocols/json.hpp"
 
@@ -34,6 +35,9 @@ int run_web(const WebOptions& options) {
   gateway.foxglove_origins = options.origins;
   gateway.page = find_page();
   gateway.reports = options.reports;
+  gateway.suites = options.suites;
+  gateway.identifies = options.identifies;
+  gateway.verb = run_child_verb;
   try {
     gateway.listen = web::parse_listen_address(options.listen);
     web::run_gateway(gateway, [&options](const std::string& url) {

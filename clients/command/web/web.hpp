@@ -15,6 +15,8 @@ struct WebOptions {
   std::string key{};                   ///< a file, PEM
   std::string browser_token{};         ///< a file with the token that browsers must show
   std::string reports{};               ///< a folder of reports for the page
+  std::string suites{};                ///< a folder of suites that the page runs
+  bool identifies = false;             ///< for the page
   std::vector<std::string> origins{};  ///< whose pages may open Foxglove's WebSocket
 };
 int run_web(const WebOptions& options);

@@ -20,6 +20,13 @@ void add_web_command(CommandLine& line) {
                  "show the reports in this folder: .html of `drivebench test`, .json and .svg of `drivebench "
                  "identify`")
       ->type_name("FOLDER");
+  sub.add_option(
+         "--suites", o.suites,
+         "let operators run `drivebench test` on the suites in this folder, and so every program that "
+         "their cases name; needs --reports")
+      ->type_name("FOLDER");
+  sub.add_flag("--identify", o.identifies,
+               "let operators identify motors from experiments of the bench; needs --reports");
   sub.add_option("--allow-origin", o.origins,
                  "a site whose page may read through Foxglove's WebSocket, such as https://app.foxglove.dev")
       ->type_name("ORIGIN");

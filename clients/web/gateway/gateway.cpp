@@ -19,8 +19,9 @@
 #include "clients/web/gateway/page_files.hpp"
 #include "clients/web/gateway/relays/foxglove_session.hpp"
 #include "clients/web/gateway/relays/relay.hpp"
-#include "clients/web/gateway/report_folder.hpp"
+#include "clients/web/gateway/reports/report_folder.hpp"
 #include "clients/web/gateway/reports/reports.hpp"
+#include "clients/web/gateway/runs/runs.hpp"
 
 namespace drivebench::web {
 namespace {
@@ -54,11 +55,16 @@ constexpr std::string_view kReportPolicy =
     "'none'; "
     "frame-ancestors 'none'";
 constexpr std::string_view kReportsPath = "/reports";
+constexpr std::string_view kRunsPath = "/runs";
 
 /// A connection as the others see it. One that waits for a request may have to give way to a new one.
 struct Place {
   std::function<void()> close{};  ///< while it waits
 };
+
+bool runs_something(const GatewayOptions& options) {
+  return !options.suites.empty() || options.identifies;
+}
 
 /// One thread runs everything but the calls that wait for the bench: those have threads of their own.
 struct Shared {
@@ -66,6 +72,12 @@ struct Shared {
       : options(chosen), files(read_page_files(chosen.page)), probe(chosen.bench, chosen.bench_token) {
     if (!chosen.certificate.empty()) tls.emplace(chosen.certificate, chosen.key);
     if (!chosen.reports.empty()) reports.emplace(chosen.reports);
+    if (runs_something(chosen))
+      relays.runs = &runs.emplace(RunPlaces{.reports = chosen.reports,
+                                            .bench = chosen.bench,
+                                            .bench_token = chosen.bench_token,
+                                            .verb = chosen.verb},
+                                  chosen.suites, chosen.identifies);
   }
 
   GatewayOptions options;
@@ -73,6 +85,7 @@ struct Shared {
   Door door{};
   std::optional<TlsDoor> tls{};
   std::optional<ReportFolder> reports{};
+  std::optional<Runs> runs{};
   int sent_reports = 0;  ///< at this moment
   BenchProbe probe;
   GatewayCounts counts{};
@@ -153,6 +166,15 @@ asio::awaitable<Response> respond_with_report(Shared& shared, const Request& req
   co_return response;
 }
 
+/// The suites and the runs, or null. A thread of its own waits for the disk.
+asio::awaitable<Response> respond_with_runs(Shared& shared, const Request& request) {
+  const auto list = [&runs = shared.runs]() -> asio::awaitable<std::string> {
+    co_return runs ? runs->list() : "null";
+  };
+  std::string text = co_await asio::co_spawn(shared.probing, list, use_awaitable);
+  co_return answer_of(request, 200, "application/json", std::move(text));
+}
+
 bool asks_for_report(const Request& request) {
   const std::string_view target = view(request.target());
   return target == kReportsPath || (target.starts_with(kReportsPath) && target[kReportsPath.size()] == '/');
@@ -169,6 +191,10 @@ asio::awaitable<Response> respond(Shared& shared, const Request& request) {
   }
   if (asks_for_report(request)) {
     Response response = co_await respond_with_report(shared, request);
+    co_return response;
+  }
+  if (target == kRunsPath) {
+    Response response = co_await respond_with_runs(shared, request);
     co_return response;
   }
   if (target == kFoxglovePath && websocket::is_upgrade(request)) {
@@ -313,6 +339,8 @@ void check(const GatewayOptions& options) {
         "--listen " + to_string(options.listen) +
         ": others can reach this address, so that it needs --certificate, --key and --browser-token");
   }
+  if (runs_something(options) && options.reports.empty())
+    throw StartError("--suites and --identify need --reports: a folder for the results");
   for (const std::string& origin : options.foxglove_origins) {
     if (!is_origin(origin)) {
       throw StartError("--allow-origin " + origin +

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "clients/web/gateway/doors/listen_address.hpp"
+#include "clients/web/gateway/runs/verb.hpp"
 
 namespace drivebench::web {
 
@@ -19,6 +20,9 @@ struct GatewayOptions {
   std::vector<std::string> foxglove_origins;  ///< whose pages may open Foxglove's WebSocket
   std::filesystem::path page;                 ///< the folder of its files
   std::filesystem::path reports;              ///< a folder of reports; empty: none are shown
+  std::filesystem::path suites;               ///< a folder of suites that browsers run; empty: none
+  bool identifies = false;                    ///< for browsers, from experiments of the bench
+  RunVerb verb;                               ///< for both
 };
 
 /// Serves the page, its WebSocket and the reports until SIGINT or SIGTERM. Each WebSocket is a session of its

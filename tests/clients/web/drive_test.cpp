@@ -215,14 +215,15 @@ TEST_F(DriveTest, AnOrderIsCarriedOutWholeOrRefused) {
   EXPECT_EQ(problem_of("hello"), "the text is not JSON");
   EXPECT_EQ(problem_of(R"({"op":"pace","pace":1e999})"), "the text is not JSON");
   EXPECT_EQ(problem_of("[]"), "op: is missing");
-  EXPECT_EQ(problem_of(R"({"op":"fly"})"), R"(op: "fly" is not one of drive, pace, step, presets, alive)");
+  EXPECT_EQ(problem_of(R"({"op":"fly"})"),
+            R"(op: "fly" is not one of drive, pace, step, presets, alive, run_suite, identify, cancel_run)");
   EXPECT_EQ(problem_of(R"({"op":"pace","pace":2})"), "pace: 2 is no number from 0 to 1");
   EXPECT_EQ(problem_of(R"({"op":"step","ticks":1.5})"), "ticks: 1.5 is no whole number");
   EXPECT_EQ(problem_of(axes(R"({"axis":1,)" + axis + "}")), "axis: 1 is no number from 0 to 0");
   EXPECT_EQ(problem_of(axes(R"({"axis":0,)" + axis + R"(},{"axis":0,)" + axis + "}")), "axis: 0 comes twice");
   EXPECT_EQ(problem_of(axes(R"({"axis":0,"gates":"on"})")),
             R"(gates: "on" is not one of off, voltage, current, duty)");
-  EXPECT_EQ(problem_of(axes(R"({"axis":0,"preset":7,"run":1})")), "preset: 7 is no name");
+  EXPECT_EQ(problem_of(axes(R"({"axis":0,"preset":7,"run":1})")), "preset: 7 is no text");
   EXPECT_EQ(problem_of(axes(R"({"axis":0,"preset":"p"})")), "run: is missing");
   EXPECT_EQ(problem_of(axes(R"({"axis":0,"preset":"p","run":1})")).substr(0, 13), "no preset 'p'");
   EXPECT_EQ(problem_of(axes(R"({"axis":0,"gates":"duty","constant":[1]})")),

@@ -2,7 +2,7 @@
 export function reportScenarios({ axeFinds, press, text }) {
   const rows = (page) => page.$$eval("#reports div:last-child tbody tr", (all) => all.map((row) => [...row.children].map((each) => each.textContent)));
   const names = (page) => page.$$eval("#reports .list tbody th", (all) => all.map((each) => each.textContent));
-  const answer = (page, pattern) => text(page, "#reports .answer", pattern);
+  const answer = (page, pattern) => text(page, "#reports > .answer", pattern);
 
   /** A report in a tab of its own. */
   async function opened(page, name) {

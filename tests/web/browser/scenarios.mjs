@@ -9,6 +9,7 @@ import puppeteer from "puppeteer-core";
 import { driveScenarios } from "./drive_scenarios.mjs";
 import { experimentScenarios } from "./experiment_scenarios.mjs";
 import { reportScenarios } from "./report_scenarios.mjs";
+import { runScenarios } from "./run_scenarios.mjs";
 
 const kPatienceMs = 60_000;
 const lines = createInterface({ input: process.stdin })[Symbol.asyncIterator]();
@@ -149,6 +150,7 @@ async function pictureOf(page, theme, path, first, last) {
 const scenarios = {
   ...driveScenarios({ axeFinds, enter, outside, pictureOf, press, set, stateOf, text, until }),
   ...reportScenarios({ axeFinds, press, text }),
+  ...runScenarios({ axeFinds, enter, pictureOf, press, set, stateOf, text, until }),
   ...experimentScenarios({ axeFinds, catchFiles, enter, isShown, pictureOf, press, set, stateOf, text, until }),
 
   /** A user opens the page and looks. */

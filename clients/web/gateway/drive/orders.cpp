@@ -17,7 +17,7 @@ constexpr double kLargest = 1e6;    // of a set-point, as in the bench's own rul
 constexpr double kSteepest = 1e12;  // of an amplitude over the frequency
 constexpr double kLongestRamp_s = 3600.0;
 constexpr double kMostSteps = 1e6;
-constexpr double kMostRuns = 1e15;
+constexpr double kMostNumber = 1e15;
 
 struct GatesWord {
   v1::Gates gates;
@@ -69,17 +69,21 @@ link::Setpoints constant_of(const nlohmann::json& object) {
   return {.a = at(0), .b = at(1), .c = at(2), .f = at(3)};
 }
 
-std::string preset_of(const nlohmann::json& object) {
-  const nlohmann::json& name = object.at("preset");
-  if (!name.is_string()) throw OrderError(fmt::format("preset: {} is no name", ascii_json_text(name)));
-  return name.get<std::string>();
+std::string text_of(const nlohmann::json& object, const char* name) {
+  const nlohmann::json& text = member_of(object, name);
+  if (!text.is_string()) throw OrderError(fmt::format("{}: {} is no text", name, ascii_json_text(text)));
+  return text.get<std::string>();
+}
+
+std::uint32_t axis_number_of(const nlohmann::json& object, std::size_t axis_count) {
+  return static_cast<std::uint32_t>(count_of(object, "axis", 0.0, static_cast<double>(axis_count) - 1.0));
 }
 
 Order::Axis axis_of(const nlohmann::json& object, std::size_t axis_count) {
-  const auto axis =
-      static_cast<std::uint32_t>(count_of(object, "axis", 0.0, static_cast<double>(axis_count) - 1.0));
+  const std::uint32_t axis = axis_number_of(object, axis_count);
   if (object.contains("preset"))
-    return {.axis = axis, .preset = preset_of(object), .run = count_of(object, "run", 1.0, kMostRuns)};
+    return {
+        .axis = axis, .preset = text_of(object, "preset"), .run = count_of(object, "run", 1.0, kMostNumber)};
   return {.axis = axis,
           .target = {.gates = gates_of(object),
                      .constant = constant_of(object),
@@ -117,9 +121,23 @@ Order order_of(const nlohmann::json& message, std::size_t axis_count) {
     order.ticks = count_of(message, "ticks", 1.0, kMostSteps);
   } else if (op == "presets") {
     order.kind = Order::Kind::kPresets;
+  } else if (op == "run_suite") {
+    order.kind = Order::Kind::kRunSuite;
+    order.suite = text_of(message, "suite");
+  } else if (op == "identify") {
+    order.kind = Order::Kind::kIdentify;
+    order.identification = {.experiment = count_of(message, "experiment", 0.0, kMostNumber),
+                            .owner = text_of(message, "owner"),
+                            .axis = axis_number_of(message, axis_count),
+                            .motor = text_of(message, "motor")};
+  } else if (op == "cancel_run") {
+    order.kind = Order::Kind::kCancelRun;
+    order.run = count_of(message, "run", 0.0, kMostNumber);
   } else if (op != "alive") {
     throw OrderError(
-        fmt::format("op: {} is not one of drive, pace, step, presets, alive", ascii_json_text(op)));
+        fmt::format("op: {} is not one of drive, pace, step, presets, alive, run_suite, "
+                    "identify, cancel_run",
+                    ascii_json_text(op)));
   }
   return order;
 }

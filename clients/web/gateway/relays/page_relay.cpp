@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <memory>
+#include <nlohmann/json.hpp>
 #include <optional>
 #include <span>
 #include <string>
@@ -11,6 +12,7 @@
 #include "clients/web/gateway/relays/relay.hpp"
 #include "clients/web/gateway/relays/send_queue.hpp"
 #include "protocols/framing.hpp"
+#include "protocols/json.hpp"
 
 namespace drivebench::web {
 namespace {
@@ -25,8 +27,8 @@ Drive::Time now() {
   return std::chrono::steady_clock::now();
 }
 
-/// Four coroutines share it. Binary messages of the page are frames for the bench; texts are orders of its
-/// drive, whose requests go out between those frames.
+/// Four coroutines share it. Binary messages of the page are frames for the bench; texts are orders for its
+/// drive, whose requests go out between those frames, and for the runs of the gateway.
 class PageRelay : public Relay, public std::enable_shared_from_this<PageRelay> {
  public:
   PageRelay(RelayContext& context, Stream stream)
@@ -72,12 +74,18 @@ class PageRelay : public Relay, public std::enable_shared_from_this<PageRelay> {
     leave(websocket::close_code::normal, "");
   }
 
-  /// Gives a text to the drive, which answers a wrong one; the reason why it cannot, or nothing. Runs are
-  /// made on another thread: this one has the commands of all pages to send.
+  /// Gives a text to the drive, which answers a wrong one, or to the runs; the reason why it cannot, or
+  /// nothing. Runs are made on another thread: this one has the commands of all pages to send.
   asio::awaitable<std::string_view> carry_out(std::span<const std::byte> message) {
     if (!drive_) co_return "before the welcome of the bench messages are binary";
     try {
       const Order order = drive_->read({reinterpret_cast<const char*>(message.data()), message.size()});
+      if (order.is_for_runs()) {
+        const auto ask = [&]() -> asio::awaitable<std::string> { co_return answer_of_runs(order); };
+        told_of_runs_ = co_await asio::co_spawn(context_.connecting, ask, use_awaitable);
+        pause_.cancel();
+        co_return std::string_view();
+      }
       Drive::Runs begun;
       if (const std::vector<Beginning> beginnings = drive_->beginnings_of(order); !beginnings.empty()) {
         const auto make = [&]() -> asio::awaitable<Drive::Runs> {
@@ -92,6 +100,33 @@ class PageRelay : public Relay, public std::enable_shared_from_this<PageRelay> {
     }
     turn_.cancel();
     co_return std::string_view();
+  }
+
+  /// What the page is told of an order for the runs, as JSON: {"runs": {"said", "is_refusal", "run"}}.
+  std::string answer_of_runs(const Order& order) {
+    const auto answer = [](const RunAnswer& said, bool is_refusal) {
+      return json_text(nlohmann::ordered_json{
+          {"runs", {{"said", said.sentence}, {"is_refusal", is_refusal}, {"run", said.number}}}});
+    };
+    try {
+      return answer(carried_out_by_runs(order), false);
+    } catch (const RunRefusal& refusal) {
+      return answer({.sentence = refusal.what()}, true);
+    }
+  }
+
+  /// The bench knows who may change something there, and no one else may start programs here.
+  RunAnswer carried_out_by_runs(const Order& order) {
+    if (context_.runs == nullptr)
+      throw RunRefusal("this gateway runs nothing: it was started without --suites and --identify");
+    if (!may_run_) throw RunRefusal("role: the bench lets this browser only look, and so it starts nothing");
+    if (order.kind == Order::Kind::kCancelRun) return context_.runs->cancel(order.run);
+    if (order.kind == Order::Kind::kRunSuite) return context_.runs->ask(order.suite);
+    const Order::Identification& wanted = order.identification;
+    return context_.runs->ask({.experiment = wanted.experiment,
+                               .owner = wanted.owner,
+                               .axis = drive_->bench()->axes(static_cast<int>(wanted.axis)).name(),
+                               .motor = wanted.motor});
   }
 
   /// Writes whole, one coroutine after the other.
@@ -139,8 +174,11 @@ class PageRelay : public Relay, public std::enable_shared_from_this<PageRelay> {
   /// The welcome has what the drive must know.
   void begin_drive(std::span<const std::byte> frame) {
     v1::Envelope envelope;
-    if (envelope.ParseFromArray(frame.data(), static_cast<int>(frame.size())) && envelope.has_welcome())
-      drive_.emplace(envelope.welcome());
+    if (!envelope.ParseFromArray(frame.data(), static_cast<int>(frame.size())) || !envelope.has_welcome())
+      return;
+    const v1::Role role = envelope.welcome().role();
+    may_run_ = role == v1::ROLE_OPERATOR || role == v1::ROLE_CONDUCTOR || role == v1::ROLE_ADMIN;
+    drive_.emplace(envelope.welcome());
   }
 
   /// Sends the requests of the drive, until the bench has gone or, without a browser, the drive is over.
@@ -165,16 +203,14 @@ class PageRelay : public Relay, public std::enable_shared_from_this<PageRelay> {
     for (error_code error; !error && !leaving_;) {
       queue_.take(message);
       const std::string report = drive_ ? drive_->report(now()) : std::string();
+      const std::string of_runs = std::exchange(told_of_runs_, {});
       if (!message.empty()) {
         co_await client_.async_write(asio::buffer(message), asio::redirect_error(use_awaitable, error));
       }
-      if (!report.empty() && !error) {
-        client_.text(true);
-        co_await client_.async_write(asio::buffer(report), asio::redirect_error(use_awaitable, error));
-        client_.binary(true);
-      }
-      context_.counts.bytes_to_browsers += message.size() + report.size();
-      if (!message.empty() || !report.empty()) {
+      if (!error) co_await write_text(report, error);
+      if (!error) co_await write_text(of_runs, error);
+      if (!message.empty() || !report.empty() || !of_runs.empty()) {
+        context_.counts.bytes_to_browsers += message.size();
         if (is_driving()) co_await rest();
         continue;
       }
@@ -184,6 +220,14 @@ class PageRelay : public Relay, public std::enable_shared_from_this<PageRelay> {
     leave(websocket::close_code::normal, "");
     for (bool goes_on = true; goes_on;)
       goes_on = co_await wait();
+  }
+
+  asio::awaitable<void> write_text(const std::string& text, error_code& error) {
+    if (text.empty()) co_return;
+    client_.text(true);
+    co_await client_.async_write(asio::buffer(text), asio::redirect_error(use_awaitable, error));
+    client_.binary(true);
+    context_.counts.bytes_to_browsers += text.size();
   }
 
   asio::awaitable<void> rest() {
@@ -213,6 +257,8 @@ class PageRelay : public Relay, public std::enable_shared_from_this<PageRelay> {
   asio::steady_timer turn_;       // of the drive
   asio::steady_timer turnstile_;  // of what is written to the bench
   bool is_writing_ = false;
+  bool may_run_ = false;        // by its role with the bench
+  std::string told_of_runs_{};  // the newest that the browser has not got
   std::optional<Leaving> leaving_{};
 };
 

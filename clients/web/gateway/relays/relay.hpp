@@ -9,6 +9,7 @@
 
 #include "clients/web/gateway/doors/asio.hpp"
 #include "clients/web/gateway/reports/reports.hpp"
+#include "clients/web/gateway/runs/runs.hpp"
 
 namespace drivebench::web {
 
@@ -27,6 +28,7 @@ struct RelayContext {
   std::string bench_token;  ///< of the gateway's own sessions
   GatewayCounts& counts;
   asio::thread_pool& connecting;
+  Runs* runs = nullptr;  ///< null: browsers start none
 };
 
 /// A WebSocket and its session with the bench, until one of them ends. The coroutine that sends to the client

@@ -26,6 +26,7 @@ class Page {
   private drive: DrivePanel | null = null;
   private experiments: ExperimentsPanel | null = null;
   private readonly player = new PlayerPlace(byId("player"));
+  private readonly reports = new ReportsPanel(byId("reports"));
   private subscribed: string[] = [];
 
   constructor() {
@@ -35,6 +36,7 @@ class Page {
       triggered: (triggered) => this.scope?.triggered(triggered),
       notice: (notice) => this.alert(notice),
       drive: (report) => this.drive?.take(report),
+      runs: (answer) => this.reports.runs.told(answer),
       tokenWanted: (sentence) => this.wantToken(sentence),
       lost: (sentence) => this.lost(sentence),
     });
@@ -46,7 +48,6 @@ class Page {
     });
     this.theme();
     this.wire.connect();
-    new ReportsPanel(byId("reports"));
     setInterval(() => this.askStatus(), kStatusMs);
   }
 
@@ -69,7 +70,8 @@ class Page {
     this.drive = new DrivePanel(byId("drive"), bench, leases);
     this.panel = new StatePanel(byId("state"), bench, (axis) => leases.ownerOf(axis));
     this.scope = new Scope(byId("scope"), bench, usualPanes(bench.description.axes[0]), () => this.subscribe());
-    this.experiments = new ExperimentsPanel(byId("experiments"), bench, this.player);
+    this.experiments = new ExperimentsPanel(byId("experiments"), bench, this.player, this.reports.runs);
+    this.reports.runs.enter(bench);
     this.subscribe();
     this.askStatus();
   }
@@ -128,6 +130,7 @@ class Page {
   }
 
   private endPanels(): void {
+    this.reports.runs.enter(null);
     this.leases?.end();
     this.knobs?.end();
     this.drive?.end();

@@ -1,4 +1,4 @@
-/** The wire to the bench: frames of bench.proto in a WebSocket, which the gateway passes on; texts are for its drive. */
+/** The wire to the bench: frames of bench.proto in a WebSocket, which the gateway passes on; texts are for its drive and its runs. */
 import { Reader } from "protobufjs/minimal.js";
 import { drivebench } from "./bench_messages.js";
 
@@ -26,6 +26,14 @@ export interface DriveReport {
   presets?: Preset[][];
 }
 
+/** What the gateway answers when the page asks for a run, or cancels one. */
+export interface RunsAnswer {
+  said: string;
+  is_refusal: boolean;
+  /** Its number; 0 in a refusal. */
+  run: number;
+}
+
 /** A reference controller with its move. */
 export interface Preset {
   name: string;
@@ -51,6 +59,7 @@ export interface Listener {
   triggered(triggered: pb.Triggered): void;
   notice(notice: pb.Notice): void;
   drive(report: DriveReport): void;
+  runs(answer: RunsAnswer): void;
   /** The bench turned the page away: it wants another token. */
   tokenWanted(sentence: string): void;
   lost(sentence: string): void;
@@ -99,8 +108,7 @@ export class Wire {
         this.listener.tokenWanted(refusal);
       }
     };
-    socket.onmessage = ({ data }) => typeof data === "string" ? this.listener.drive(JSON.parse(data) as DriveReport)
-      : this.take(new Uint8Array(data as ArrayBuffer));
+    socket.onmessage = ({ data }) => typeof data === "string" ? this.hear(data) : this.take(new Uint8Array(data as ArrayBuffer));
     socket.onclose = (event) => {
       for (const each of this.waiting.values()) each.reject(new Error("the connection to the bench is lost"));
       this.waiting.clear();
@@ -136,9 +144,15 @@ export class Wire {
     });
   }
 
-  /** Orders the gateway's drive; what came of it is told by reports. */
+  /** Orders the gateway's drive or a run; what came of it is told by reports and answers. */
   order(order: object): void {
     if (this.socket?.readyState === WebSocket.OPEN) this.socket.send(JSON.stringify(order));
+  }
+
+  private hear(text: string): void {
+    const told = JSON.parse(text) as DriveReport | { runs: RunsAnswer };
+    if ("runs" in told) this.listener.runs(told.runs);
+    else this.listener.drive(told);
   }
 
   private take(message: Uint8Array): void {

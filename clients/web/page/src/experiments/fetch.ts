@@ -93,6 +93,7 @@ export function fetchExperiment(id: number, owner: string, recording: boolean, l
       triggered: () => undefined,
       notice: () => undefined,
       drive: () => undefined,
+      runs: () => undefined,
       tokenWanted: (sentence) => done(() => reject(new Error(sentence))),
       lost,
     }, false);

@@ -12,20 +12,23 @@ interface ListListener {
   show(info: pb.ExperimentInfo): void;
   play(info: pb.ExperimentInfo): void;
   cancel(info: pb.ExperimentInfo): void;
+  identify(info: pb.ExperimentInfo): void;
+  /** Whether the gateway can, and this session may ask for it. */
+  canIdentify(info: pb.ExperimentInfo): boolean;
 }
 
 class Row {
   readonly root = element("tr");
   private readonly cells = kHeads.slice(1, -1).map(() => element("td"));
   private readonly progress = element("progress", { max: 1 });
-  private readonly buttons: { show: HTMLButtonElement; play: HTMLButtonElement; cancel: HTMLButtonElement };
+  private readonly buttons: { show: HTMLButtonElement; play: HTMLButtonElement; identify: HTMLButtonElement; cancel: HTMLButtonElement };
   private info: pb.ExperimentInfo;
 
-  constructor(info: pb.ExperimentInfo, private readonly bench: Bench, listener: ListListener) {
+  constructor(info: pb.ExperimentInfo, private readonly bench: Bench, private readonly listener: ListListener) {
     this.info = info;
     const act = (words: keyof ListListener, text: string) =>
       button(text, () => listener[words](this.info), { "aria-label": `${text} experiment ${info.id}` });
-    this.buttons = { show: act("show", "Show data"), play: act("play", "Play recording"), cancel: act("cancel", "Cancel") };
+    this.buttons = { show: act("show", "Show data"), play: act("play", "Play recording"), identify: act("identify", "Identify"), cancel: act("cancel", "Cancel") };
     this.progress.setAttribute("aria-label", `progress of experiment ${info.id}`);
     this.root.append(element("th", { scope: "row" }, String(info.id)), ...this.cells, element("td", {}, this.progress, ...Object.values(this.buttons)));
   }
@@ -43,6 +46,7 @@ class Row {
     this.progress.hidden = !isOpen || isDone;
     this.buttons.show.hidden = !isOpen || !isDone || info.rows === 0;
     this.buttons.play.hidden = !isOpen || !isDone || info.recording_bytes === 0;
+    this.buttons.identify.hidden = this.buttons.play.hidden || !this.listener.canIdentify(info);
     this.buttons.cancel.hidden = !isOpen || isDone || !this.bench.mayChange;
   }
 }

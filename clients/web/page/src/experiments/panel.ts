@@ -5,11 +5,12 @@ import { csvOfRows } from "../exports";
 import { recordedFile } from "../player/mcap";
 import { Played, PlayerPlace } from "../player/player";
 import { recordedRows } from "../player/recorded";
+import { RunsPanel } from "../reports/runs";
 import { pb, Refused } from "../wire";
 import { Fetched, fetchExperiment, hasEnded, kMostBytes } from "./fetch";
 import { ExperimentForm } from "./form";
 import { ExperimentList } from "./list";
-import { RequestKeys } from "./request";
+import { motorOf, RequestKeys } from "./request";
 import { kStateNames } from "./states";
 import { arrivalOf, factsOf, fileNameOf, titleOf } from "./words";
 
@@ -29,11 +30,13 @@ export class ExperimentsPanel {
   /** Experiments of this page whose end it tells, and whose data it shows then unless its user looks at others. */
   private readonly awaited = new Set<number>();
 
-  constructor(root: HTMLElement, private readonly bench: Bench, private readonly player: PlayerPlace) {
+  constructor(root: HTMLElement, private readonly bench: Bench, private readonly player: PlayerPlace, private readonly runs: RunsPanel) {
     this.list = new ExperimentList(bench, {
       show: (info) => this.play(info, false),
       play: (info) => this.play(info, true),
       cancel: (info) => void this.cancel(info),
+      identify: (info) => this.identify(info),
+      canIdentify: (info) => this.runs.identifies && this.motorOf(info) !== undefined,
     });
     this.owner.value = ownSecret();
     const file = element("input", { type: "file", accept: ".mcap", "aria-label": "recording to play", change: () => void this.open(file) });
@@ -115,6 +118,15 @@ export class ExperimentsPanel {
     } catch (problem) {
       this.tell(`experiment ${info.id}: ${(problem as Error).message}`, true);
     }
+  }
+
+  private motorOf(info: pb.ExperimentInfo): string | undefined {
+    return motorOf(this.bench.description.axes[info.axis as number]);
+  }
+
+  private identify(info: pb.ExperimentInfo): void {
+    this.runs.identify(info.id as number, this.owner.value, info.axis as number, this.motorOf(info) as string);
+    this.tell(`experiment ${info.id}: its motor is identified, see Reports`);
   }
 
   /** Fetches the rows or the recording of an experiment, and plays them. */

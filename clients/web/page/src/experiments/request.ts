@@ -91,9 +91,14 @@ export function eventOf(what: string, atS: number, value: number, rampS: number)
   return { ...time, [kind]: { name, value } };
 }
 
+/** The kind of a motor as `drivebench identify` names it; undefined: it knows no such machine. */
+export function motorOf({ machine_kind: kind }: pb.IAxisDescription): string | undefined {
+  return ({ induction: "im", pm_synchronous: "pm", pm_dc: "dc", bldc: "bldc" } as Record<string, string>)[kind as string];
+}
+
 /** How the program identifies the motor from the recording, which has all that it must know; empty: it knows no such machine. */
 export function identification(axes: pb.IAxisDescription[], number: number, file: string): string {
   const axis = axes[number];
-  const motor = ({ induction: "im", pm_synchronous: "pm", pm_dc: "dc", bldc: "bldc" } as Record<string, string>)[axis.machine_kind as string];
+  const motor = motorOf(axis);
   return motor === undefined ? "" : `drivebench identify --motor ${motor} --from ${file}${axes.length > 1 ? ` --axis ${axis.name}` : ""}`;
 }

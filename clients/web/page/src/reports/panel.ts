@@ -1,6 +1,7 @@
-/** The reports in the folder of the gateway: those of tests in a tab of their own, those of identifications here. */
+/** The reports in the folder of the gateway: those of tests in a tab of their own, those of identifications here; and its runs. */
 import { button, element, setText } from "../dom";
 import { Identification, identificationIn, isInside, numberOf } from "./identification";
+import { RunsPanel } from "./runs";
 
 interface Report {
   name: string;
@@ -10,15 +11,22 @@ interface Report {
 }
 
 export class ReportsPanel {
+  readonly runs = new RunsPanel((report) => void this.ended(report));
   private readonly answer = element("p", { class: "answer", role: "status" });
   private readonly rows = element("tbody");
   private readonly shown = element("div");
 
   constructor(private readonly root: HTMLElement) {
-    root.replaceChildren(element("h2", {}, "Reports"), element("div", { class: "bar" }, button("Look again", () => void this.list())), this.answer,
-      element("div", { class: "table" }, element("table", { class: "list" }, element("thead", {}, element("tr", {},
+    root.replaceChildren(element("h2", {}, "Reports"), this.runs.root, element("div", { class: "bar" }, button("Look again", () => void this.list())), this.answer,
+      element("div", { class: "table", tabindex: 0, role: "group", "aria-label": "List of reports" }, element("table", { class: "list" }, element("thead", {}, element("tr", {},
         ...["report", "changed", ""].map((each) => element("th", { scope: "col" }, each)))), this.rows)), this.shown);
     void this.list();
+  }
+
+  /** A run has ended: its report is new, and shown if it is an identification. */
+  private async ended(report: string): Promise<void> {
+    await this.list();
+    if (report.endsWith(".json")) await this.show(report, report.replace(/\.json$/, ".svg"));
   }
 
   /** A gateway without a folder of reports has null in the place of a list. */

@@ -1,12 +1,24 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <filesystem>
 #include <optional>
 #include <string>
 #include <string_view>
+#include <utility>
 
 namespace drivebench::web {
+
+/// The endings of reports with their Content-Type.
+inline constexpr auto kReportTypes = std::to_array<std::pair<std::string_view, std::string_view>>({
+    {".html", "text/html; charset=utf-8"},
+    {".json", "application/json"},
+    {".svg", "image/svg+xml"},
+});
+
+/// Whether the name is of letters, digits, `.`, `_`, `-` and `+` and does not begin with a dot.
+bool is_report_name(std::string_view name) noexcept;
 
 /// A report that a browser asked for.
 struct ReportFile {

@@ -1,4 +1,4 @@
-#include "clients/web/gateway/report_folder.hpp"
+#include "clients/web/gateway/reports/report_folder.hpp"
 
 #include <dirent.h>
 #include <fcntl.h>
@@ -23,20 +23,14 @@ constexpr std::size_t kMostListed = 500;
 constexpr std::size_t kMostSeen = 10'000;  // entries of a folder that are looked at
 constexpr std::size_t kLongestName = 200;
 
-constexpr auto kReportTypes = std::to_array<std::pair<std::string_view, std::string_view>>({
-    {".html", "text/html; charset=utf-8"},
-    {".json", "application/json"},
-    {".svg", "image/svg+xml"},
-});
-
-bool is_plain(char c) noexcept {
+bool is_of_names(char c) noexcept {
   return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '.' || c == '_' ||
          c == '-' || c == '+';
 }
 
 /// The Content-Type of a report by its name; empty: the name is none of a report.
 std::string_view type_of_report(std::string_view name) noexcept {
-  if (name.size() > kLongestName || name.starts_with('.') || !std::ranges::all_of(name, is_plain)) return {};
+  if (!is_report_name(name)) return {};
   for (const auto& [extension, type] : kReportTypes) {
     if (name.size() > extension.size() && name.ends_with(extension)) return type;
   }
@@ -85,6 +79,11 @@ std::vector<Entry> entries_of(const std::filesystem::path& path) {
 }
 
 }  // namespace
+
+bool is_report_name(std::string_view name) noexcept {
+  return !name.empty() && name.size() <= kLongestName && !name.starts_with('.') &&
+         std::ranges::all_of(name, is_of_names);
+}
 
 ReportFolder::ReportFolder(std::filesystem::path folder) : folder_(std::move(folder)) {
   if (!open_folder(folder_).is_open())
