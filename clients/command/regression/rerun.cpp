@@ -11,6 +11,7 @@
 #include <stdexcept>
 
 #include "clients/command/common/basics/errors.hpp"
+#include "clients/command/common/programs/composed_file.hpp"
 #include "clients/command/common/programs/installation.hpp"
 #include "clients/command/common/programs/process.hpp"
 #include "clients/command/common/programs/temporary_folder.hpp"
@@ -22,6 +23,7 @@
 #include "clients/command/regression/failures/serve_failure.hpp"
 #include "clients/command/regression/test.hpp"
 #include "clients/regression/reports/reports.hpp"
+#include "clients/regression/suite/compose.hpp"
 #include "protocols/json.hpp"
 #include "protocols/text.hpp"
 
@@ -228,6 +230,9 @@ int run_rerun(const RerunOptions& options) {
   const Unpacked bundle = unpack_bundle(options.bundle, parts);
   end_if_interrupted();
   if (options.plant_only) return replay_plant(options, bundle);
+  // The bus of the case is for its device under test alone.
+  if (!options.interactive)
+    write_file(bundle.bench_file, regression::linked_bench(bundle.what, bundle.bench_file));
   const PreparedCase prepared = prepared_or_refused(options, bundle);
   if (!options.interactive) return run_again(options, bundle, prepared, run);
   return serve_bench(prepared, *repeated_part(options, bundle, prepared), options.port);

@@ -1,13 +1,17 @@
 #include "clients/command/regression/test.hpp"
 
 #include <fmt/format.h>
+#include <unistd.h>
 
 #include <algorithm>
+#include <cerrno>
 #include <chrono>
 #include <cstdio>
 #include <cstdlib>
 #include <optional>
 #include <stdexcept>
+#include <string_view>
+#include <system_error>
 
 #include "clients/command/common/basics/errors.hpp"
 #include "clients/command/common/basics/output.hpp"
@@ -197,10 +201,26 @@ void print_bad(const CaseResult& result, const TestOptions& options) {
   if (!options.tap && !regression::is_good(result)) fmt::print("{}", regression::table_row(result));
 }
 
+/// A folder that takes nothing must not cost the run. It need not exist yet.
+void require_writable(std::string_view option, const std::string& folder) {
+  if (folder.empty()) return;
+  std::filesystem::path place = std::filesystem::absolute(folder);
+  std::error_code none;
+  while (place.has_relative_path() && !std::filesystem::exists(place, none))
+    place = place.parent_path();
+  if (!std::filesystem::is_directory(place, none))
+    throw UsageError(fmt::format("{}: {} is no folder", option, place.string()));
+  if (::access(place.c_str(), W_OK | X_OK) == 0) return;
+  throw UsageError(fmt::format("{}: cannot write into {}: {}", option, place.string(),
+                               std::generic_category().message(errno)));
+}
+
 /// Runs the cases without a result. Of those that have one from before, the ones that have not passed are
 /// printed.
 Work run_cases(const TestOptions& options, const std::filesystem::path& suite,
                regression::TimingReport& timing) {
+  require_writable("--results", options.results_folder);
+  require_writable("--keep", options.keep_folder);
   std::optional<StoredResults> stored;
   if (!options.results_folder.empty()) stored.emplace(options.program, std::vector{options.results_folder});
   Work work = work_of(chosen_cases(options, suite), stored ? &*stored : nullptr);

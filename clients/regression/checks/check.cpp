@@ -121,7 +121,7 @@ Finding Check::finish() const {
   finding.applied = true;
   if (not_finite_at_) {
     finding.at_s = seconds(*not_finite_at_);
-    finding.sentence = fmt::format("{} is no finite number at {:.6g} s", spec_.signal->name, finding.at_s);
+    finding.sentence = fmt::format("{} is no finite number", spec_.signal->name);
     return finding;
   }
   Outcome found = outcome();

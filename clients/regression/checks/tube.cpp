@@ -12,6 +12,8 @@ namespace {
 
 /// The signal stays within abs + rel·|golden| of a golden run or of that of a reference controller, tick by
 /// tick. A tick that the golden run lacks is compared with the one before it, so that it may be decimated.
+/// What is before its first and after its last tick is not compared, unless the check has a window of its
+/// own.
 class Tube final : public Check {
  public:
   Tube(const CheckSpec& spec, const RunFacts& facts)
@@ -40,6 +42,15 @@ class Tube final : public Check {
   }
   Outcome outcome() const override {
     const bool has_compared = compared_ != 0;
+    if (has_compared && !covers_window()) {
+      return {.passed = false,
+              .measured = deviation_,
+              .limit = room_,
+              .worst_tick = worst_tick_,
+              .unit = unit(),
+              .sentence = fmt::format("the golden run goes from {:.6g} s to {:.6g} s only",
+                                      seconds(golden_.ticks.front()), seconds(golden_.ticks.back()))};
+    }
     return {.passed = has_compared && excess_ <= 0.0,
             .measured = deviation_,
             .limit = room_,
@@ -48,6 +59,14 @@ class Tube final : public Check {
             .sentence = has_compared ? fmt::format("{} from the golden run, max {}",
                                                    with_unit(deviation_, unit()), with_unit(room_, unit()))
                                      : "never applied: the golden run has no tick of the window"};
+  }
+
+  bool covers_window() const noexcept {
+    const std::vector<std::uint64_t>& ticks = golden_.ticks;
+    const std::uint64_t step = ticks.size() > 1 ? ticks.back() - ticks[ticks.size() - 2] : 1;
+    const bool begins_late = spec().from_s > 0.0 && first_tick() < ticks.front();
+    const bool ends_early = spec().to_s && last_seen() >= ticks.back() + step;
+    return !begins_late && !ends_early;
   }
 
   Golden golden_;

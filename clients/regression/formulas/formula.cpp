@@ -39,6 +39,13 @@ double power_of(double base, int exponent) noexcept {
   return exponent < 0 ? 1.0 / product : product;
 }
 
+/// What is no number stays none, so that a check of it fails.
+double sign_of(double value) noexcept {
+  if (value > 0.0) return 1.0;
+  if (value < 0.0) return -1.0;
+  return std::isnan(value) ? value : 0.0;
+}
+
 }  // namespace
 
 /// Recursive descent. The first mistake ends it: after that every part is without dimension.
@@ -294,7 +301,7 @@ double Formula::value(std::span<const Sample> samples, std::size_t axis,
         stack[top - 1] = std::sqrt(stack[top - 1]);
         continue;
       case Code::kSign:
-        stack[top - 1] = stack[top - 1] > 0.0 ? 1.0 : stack[top - 1] < 0.0 ? -1.0 : 0.0;
+        stack[top - 1] = sign_of(stack[top - 1]);
         continue;
       default:
         break;
@@ -305,8 +312,8 @@ double Formula::value(std::span<const Sample> samples, std::size_t axis,
     if (step.code == Code::kSubtract) left -= right;
     if (step.code == Code::kMultiply) left *= right;
     if (step.code == Code::kDivide) left /= right;
-    if (step.code == Code::kMin) left = std::min(left, right);
-    if (step.code == Code::kMax) left = std::max(left, right);
+    if (step.code == Code::kMin) left = std::isnan(right) ? right : std::min(left, right);
+    if (step.code == Code::kMax) left = std::isnan(right) ? right : std::max(left, right);
   }
   return stack[0];
 }

@@ -169,8 +169,21 @@ bool moved(ProblemList& from, ProblemList& to) {
   return false;
 }
 
+/// The names of the cases of a suite. Results and bundles are files of these names, where a '/' is a '_'.
+class Names {
+ public:
+  /// False: it is taken already.
+  bool take(std::string name) {
+    std::ranges::replace(name, '/', '_');
+    return taken_.insert(std::move(name)).second;
+  }
+
+ private:
+  std::set<std::string> taken_;
+};
+
 /// The cases of a file; `name` is that of the file within its suite. Problems go to the list.
-void visit_case_file(const fs::path& file, const std::string& name, ProblemList& problems,
+void visit_case_file(const fs::path& file, const std::string& name, Names& names, ProblemList& problems,
                      const SeeCase& see) {
   const std::string path = file.string();
   const FileText content = read_file(file, kMaxConfigBytes);
@@ -188,6 +201,14 @@ void visit_case_file(const fs::path& file, const std::string& name, ProblemList&
     const ConfigNode whole = matrix.at(i, *root, path, found);
     Case c = read_case(whole, file, with_values(name, values), found);
     if (moved(found, problems)) return;  // the other combinations would tell most of it again
+    if (!names.take(c.name)) {
+      problems.add(
+          path, c.line, "",
+          fmt::format(
+              "makes a second case of the name \"{}\"{}", printable(c.name),
+              c.name.find_first_of("/_") == std::string::npos ? "" : ", where / and _ count as the same"));
+      return;
+    }
     c.values = std::move(values);
     see(std::move(c));
   }
@@ -211,8 +232,9 @@ void visit_suite(const fs::path& suite, const SeeCase& see) {
     files.emplace_back(suite.stem().string(), suite);
   }
   std::ranges::sort(files);
+  Names names;
   for (const auto& [name, file] : files)
-    visit_case_file(file, name, problems, see);
+    visit_case_file(file, name, names, problems, see);
   problems.throw_if_any();
 }
 

@@ -223,7 +223,11 @@ class Composer {
     using enum DeviceUnderTest::Link;
     const bool is_attached = case_.device.kind == DeviceUnderTest::Kind::kAttached;
     if (case_.device.link == kTcp && is_attached) {
-      merge(child_or_new(bench_, "tcp", Kind::kTable), case_.device.place);
+      ConfigNode& tcp = child_or_new(bench_, "tcp", Kind::kTable);
+      merge(tcp, case_.device.place);
+      if (const std::string tokens = text_of(tcp, "tokens_file"); !tokens.empty())
+        set(tcp, "tokens_file",
+            fs::absolute(fs::path(case_.file).parent_path() / tokens).lexically_normal().string());
     } else if (case_.device.link == kModbus) {
       ConfigNode& modbus = child_or_new(bench_, "modbus", Kind::kTable);
       if (!is_attached) set(modbus, "port", std::int64_t{0});
@@ -269,7 +273,8 @@ class Composer {
     if (step.action == Step::Action::kMessage) return;
     ConfigNode event = timed(step);
     add_action(event, step);
-    child_or_new(*on, std::string(table_of(step.action)), Kind::kArray).children.push_back(std::move(event));
+    child_or_new(*on, std::string(event_table(step.action)), Kind::kArray)
+        .children.push_back(std::move(event));
   }
 
   /// A table with the time of a step.
@@ -294,23 +299,6 @@ class Composer {
     if (at_s > 0.0) set(event, "delay_s", at_s);
   }
 
-  static std::string_view table_of(Step::Action action) {
-    switch (action) {
-      case Step::Action::kParameter:
-        return "set";
-      case Step::Action::kFault:
-        return "fault";
-      case Step::Action::kImpulse:
-        return "bump";
-      case Step::Action::kMultisine:
-        return "multisine";
-      case Step::Action::kMessage:  // no event
-      case Step::Action::kLoad:
-        break;
-    }
-    return "load";
-  }
-
   static void add_action(ConfigNode& event, const Step& step) {
     if (step.action == Step::Action::kMultisine) return merge(event, step.multisine);
     const std::string key = step.action == Step::Action::kLoad      ? "load_nm"
@@ -329,6 +317,23 @@ class Composer {
 };
 
 }  // namespace
+
+std::string_view event_table(Step::Action action) noexcept {
+  switch (action) {
+    case Step::Action::kParameter:
+      return "set";
+    case Step::Action::kFault:
+      return "fault";
+    case Step::Action::kImpulse:
+      return "bump";
+    case Step::Action::kMultisine:
+      return "multisine";
+    case Step::Action::kMessage:  // no event
+    case Step::Action::kLoad:
+      break;
+  }
+  return "load";
+}
 
 std::string composed_bench(const Case& c, const fs::path& bench_file) {
   return Composer(c, bench_file).text();

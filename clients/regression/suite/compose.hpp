@@ -23,6 +23,9 @@ std::string composed_bench(const Case& c, const std::filesystem::path& bench_fil
 /// A composed bench of which remove_places() has taken the bus of its case, with that bus.
 std::string linked_bench(const Case& c, const std::filesystem::path& composed);
 
+/// The list of an axis in a bench file to which steps of this action go as events.
+std::string_view event_table(Step::Action action) noexcept;
+
 /// A message to the device under test for `drivebench-server --messages`, and its line in the case file.
 struct ComposedMessage {
   int line;

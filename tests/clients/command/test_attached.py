@@ -158,6 +158,38 @@ class Attached(RegressionTest):
                                   env=self.environment, timeout=PATIENCE_S, check=False)
         self.assertEqual(replayed.returncode, OK, replayed.stdout + replayed.stderr)
 
+    def test_a_bench_may_ask_for_tokens(self):
+        """Catches: tokens that are looked for elsewhere than beside the case, a runner that its own bench turns away, a bundle with secrets
+        or without its way to them, a drive of which a wrong token is no reason."""
+        port = free_ports(1)[0]
+        place = f'port = {port}\ntokens_file = "tokens"'
+        path = self.case("tcp", place, limit_s=30)
+        tokens = self.write("tokens", '[[token]]\nname = "drive"\nrole = "operator"\ntoken = "of-the-drive"\n'
+                                      '[[token]]\nname = "runner"\nrole = "viewer"\ntoken = "of-the-runner"\n')
+        suite = self.folder / "suite"
+        self.assertRegex(self.run_test(suite, code=USAGE).stderr, r"case.toml:\d+: dut.tcp.tokens_file needs DRIVEBENCH_TOKEN")
+        self.environment["DRIVEBENCH_TOKEN"] = "of-the-drive"
+        tokens.chmod(0o644)
+        self.assertIn("chmod 600 it", self.run_test(suite, code=USAGE).stderr)
+        tokens.chmod(0o600)
+        with self.drive(f"tcp:127.0.0.1:{port}"):
+            self.environment["DRIVEBENCH_TOKEN"] = "of-the-runner"
+            self.assertEqual(self.suite("--retries", 20)["cases"][0]["verdict"], "pass")
+            path.write_text(path.read_text().replace("speed_rad_s > 5", "speed_rad_s > 5000"), encoding="utf-8")
+            self.suite("--retries", 20, "--keep", self.folder / "kept", code=FAILED)
+            bundle = self.folder / "kept/case.zip"
+            with zipfile.ZipFile(bundle) as parts:
+                self.assertFalse([name for name in parts.namelist() if b"of-the-" in parts.read(name)])
+            again = subprocess.run([COMMAND, "rerun", str(bundle)], capture_output=True, text=True, env=self.environment,
+                                   timeout=PATIENCE_S, check=False)
+        self.assertIn(again.returncode, (FAILED, 4), again.stdout + again.stderr)
+        self.assertIn("turns", again.stdout)
+        self.case("tcp", place, limit_s=1)
+        with self.drive(f"tcp:127.0.0.1:{port}"):  # with the token of a viewer
+            self.assertIn("never armed within 1 s: no device under test took the lease", self.suite(code=FAILED)["cases"][0]["reason"])
+        self.environment["DRIVEBENCH_TOKEN"] = "guessed"
+        self.assertIn("wrong token", self.suite(code=FAILED)["cases"][0]["reason"])
+
     def test_what_cannot_be_attached_is_refused(self):
         """Catches: an attached drive in lockstep, at a port that it cannot know, or beside a program."""
         whole = CASE.format(way="tcp", place="port = 7300", limit_s=30, watchdog=250, extra="")

@@ -272,6 +272,23 @@ override.axis.servo.machine.rotor_resistance_ohm = [3.9, 5.85]
         self.assertIn("none of the 2 cases", self.run_test(self.folder / "suite", "--tag", "slow", code=USAGE).stderr)
         self.assertIn("no suite 'referense'; did you mean \"reference\"?", self.run_test("referense", code=USAGE).stderr)
 
+    def test_what_the_bench_refuses_is_told_at_its_line_of_the_case(self):
+        """Catches: a sentence about a composed file that is gone when it is read, and a second one without its file."""
+        self.write("servo.toml", SERVO + '[override.bench]\nsubsteps = 0\n[[step]]\nat_s = 0.1\nfault = "open_faze"\nvalue = 1\n')
+        said = self.run_test(self.folder / "suite", code=USAGE).stderr
+        self.assertRegex(said, r"servo.toml:10: bench.substeps is 0 but must lie between 1 and 64\n")
+        self.assertRegex(said, r"\n.*servo.toml:11: axis.fault.name is \"open_faze\"")
+        self.assertNotIn("the composed bench", said)
+
+    def test_a_folder_that_cannot_be_written_costs_no_run(self):
+        """Catches: a night of cases whose results, or bundles, cannot be kept."""
+        self.write("servo.toml", SERVO)
+        file = self.write("notes", "no folder")
+        for option in ("--results", "--keep"):
+            for folder in (file, file / "below"):
+                done = self.run_test(self.folder / "suite", option, folder, code=USAGE)
+                self.assertEqual((done.stdout, done.stderr), ("", f"drivebench: {option}: {file} is no folder\n"))
+
     def test_a_step_on_a_condition_acts_in_the_bench_and_must_act(self):
         """Catches: a stimulus that never came and a case that passes all the same."""
         step = '[[step]]\nwhen = "speed_rad_s > {}"\nfor_s = 0.002\nfault = "open_phase"\nvalue = 2\n'

@@ -165,7 +165,8 @@ TEST(Checks, FaultsAreCountedByTheirRises) {
   EXPECT_TRUE(found("kind = \"fault_count\"\nfault = \"trip\"", {}).passed);
 }
 
-// Catches: a golden run compared by row and not by tick, a relative room without its size, a missing column.
+// Catches: a golden run compared by row and not by tick, a relative room without its size, a missing column,
+// a window that the golden run does not reach and that passes all the same.
 TEST(Checks, ATubeFollowsTheGoldenRunTickByTick) {
   const std::string file = (std::filesystem::temp_directory_path() / "drivebench-golden.csv").string();
   {
@@ -184,6 +185,11 @@ TEST(Checks, ATubeFollowsTheGoldenRunTickByTick) {
   EXPECT_FALSE(far.passed);
   EXPECT_EQ(far.at_s, 0.025);
   EXPECT_TRUE(found(speed_check("tube", golden + "rel = 0.05"), off).passed);
+  EXPECT_TRUE(found(speed_check("tube", golden + "abs = 0.0"), same, 120).passed);
+  EXPECT_TRUE(found(speed_check("tube", golden + "abs = 0.0\nfrom_s = 0.01\nto_s = 0.1"), same, 120).passed);
+  EXPECT_FALSE(found(speed_check("tube", golden + "abs = 0.0\nto_s = 0.11"), same, 120).passed);
+  EXPECT_EQ(found(speed_check("tube", golden + "abs = 0.0\nfrom_s = 0.005"), same).sentence,
+            "the golden run goes from 0.01 s to 0.1 s only");
   EXPECT_NE(problem_of_check("kind = \"tube\"\nsignal = \"torque_nm\"\nabs = 1\n" + golden)
                 .find("has no column torque_nm"),
             std::string::npos);

@@ -35,7 +35,7 @@ void write_bundle(const std::filesystem::path& file, const BundleContent& conten
 /// A bundle in a folder.
 struct Unpacked {
   regression::Case what;
-  std::filesystem::path bench_file;  ///< with the bus of the case
+  std::filesystem::path bench_file;  ///< composed, without the bus of the case
   std::filesystem::path recording;
   std::string program;  ///< that wrote it
 };

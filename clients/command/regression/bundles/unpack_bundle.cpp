@@ -107,7 +107,6 @@ Unpacked read(const fs::path& file, const fs::path& folder) {
   if (cases.size() != 1)
     refuse(file, "case/case.toml", fmt::format("makes {} cases but a bundle has one", cases.size()));
   cases.front().name = facts.name;
-  write_file(folder / "bench.toml", regression::linked_bench(cases.front(), folder / "bench.toml"));
   return {.what = std::move(cases.front()),
           .bench_file = folder / "bench.toml",
           .recording = folder / "run.mcap",

@@ -58,12 +58,21 @@ void add_bench(const BundleContent& content, Entries& entries) {
   entries["bench.toml"] = regression::toml_text(*bench);
 }
 
+/// A bundle holds no secrets: it names the tokens file by its absolute path.
+void locate_tokens(ConfigNode& node, const fs::path& folder) {
+  auto* const text = std::get_if<std::string>(&node.scalar);
+  if (node.key == "tokens_file" && text != nullptr) *text = fs::absolute(folder / *text).lexically_normal();
+  for (ConfigNode& child : node.children)
+    locate_tokens(child, folder);
+}
+
 /// The case, and of the words of its command those that are files in its folder.
 void add_case(const Case& c, Entries& entries) {
   const fs::path folder = fs::path(c.file).parent_path();
   ConfigNode table = regression::table_of(c);
   std::size_t goldens = 0;
   for (ConfigNode& child : table.children) {
+    if (child.key == "dut") locate_tokens(child, folder);
     if (child.key == "check") take_files(child, folder, "golden-", goldens, entries, "case/");
   }
   entries["case/case.toml"] = regression::toml_text(table);

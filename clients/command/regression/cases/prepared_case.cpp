@@ -2,7 +2,11 @@
 
 #include <fmt/core.h>
 
+#include <algorithm>
+#include <charconv>
 #include <cmath>
+#include <cstdlib>
+#include <string_view>
 #include <system_error>
 
 #include "clients/command/common/basics/errors.hpp"
@@ -12,6 +16,7 @@
 #include "clients/command/regression/cases/check_messages.hpp"
 #include "clients/command/regression/cases/reference_run.hpp"
 #include "clients/regression/suite/compose.hpp"
+#include "clients/regression/suite/place_in_case.hpp"
 
 namespace drivebench::command {
 namespace fs = std::filesystem;
@@ -50,11 +55,42 @@ std::uint64_t end_tick_of(const Case& c, double period_s, std::uint32_t arming_c
   return static_cast<std::uint64_t>(run->planned_samples()) + (arming_commands > 1 ? arming_commands : 0);
 }
 
+/// The runner is a client of the bench like the drive, so where the drive needs a token it needs one, too.
+void check_token(const Case& c, ProblemList& problems) {
+  if (regression::find_child(c.device.place, "tokens_file") == nullptr) return;
+  if (std::getenv("DRIVEBENCH_TOKEN") != nullptr) return;
+  problems.add(c.file, c.device.line, "dut.tcp.tokens_file",
+               "needs DRIVEBENCH_TOKEN in the environment: the runner watches the bench with a token, too");
+}
+
+/// What is wrong with the composed bench, at the lines of the case that ask for it.
+void report_bench(const Case& c, std::string_view sentences, const fs::path& file, ProblemList& problems) {
+  const FileText composed = read_file(file, kMaxConfigBytes);
+  const std::string place = file.string() + ":";
+  for (std::string_view rest = sentences; !rest.empty();) {
+    const std::string_view sentence = rest.substr(0, rest.find('\n'));
+    rest.remove_prefix(std::min(rest.size(), sentence.size() + 1));
+    int composed_line = 0;
+    const char* const end = sentence.data() + sentence.size();
+    const bool is_placed = sentence.starts_with(place);
+    const char* rule = sentence.data() + (is_placed ? place.size() : 0);
+    if (is_placed) rule = std::from_chars(rule, end, composed_line).ptr;
+    const std::string_view said(rule, static_cast<std::size_t>(end - rule));
+    const int line = regression::line_in_case(c, composed.text, composed_line);
+    if (composed_line > 0 && line > 0 && said.starts_with(": ")) {
+      problems.add(c.file, line, "", std::string(said.substr(2)));
+    } else {
+      problems.add(c.file, c.line, c.name + ":", about_the_bench(std::string(sentence), file));
+    }
+  }
+}
+
 PreparedCase prepare_one(const Case& c, const fs::path& file, ProblemList& problems) {
   const fs::path bench = bench_file_of(c);
   write_file(file, fmt::format("# {}: {} of {}\n{}", bench.filename().string(), c.name,
                                fs::path(c.file).filename().string(), regression::composed_bench(c, bench)));
   check_messages(c, file, problems);
+  check_token(c, problems);
   return prepared_on(c, file, problems);
 }
 
@@ -117,7 +153,7 @@ std::vector<PreparedCase> prepare(const std::vector<Case>& cases, const fs::path
       for (const ConfigProblem& each : error.problems())
         problems.add(each.file, each.line, each.key, each.rule);
     } catch (const UsageError& error) {
-      problems.add(c.file, c.line, c.name + ":", about_the_bench(error.what(), file));
+      report_bench(c, error.what(), file, problems);
     }
     if (problems.full()) break;
   }

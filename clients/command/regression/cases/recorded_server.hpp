@@ -43,8 +43,8 @@ class RecordedServer {
 /// Asks a bench for its newest samples while the device under test drives it.
 class BenchView {
  public:
-  explicit BenchView(const std::string& address)
-      : link_(address, {.client = "drivebench test", .token = {}}) {}
+  explicit BenchView(const std::string& address, const std::string& token = {})
+      : link_(address, {.client = "drivebench test", .token = token}) {}
   Sample newest(std::size_t axis) { return link_.exchange({})[axis].sample; }
 
  private:

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <cstdlib>
 #include <memory>
 #include <optional>
 #include <string_view>
@@ -103,7 +104,8 @@ CaseResult run_attached_case(const PreparedCase& prepared, const fs::path& folde
   const Case& c = *prepared.what;
   const std::size_t place = find_axis(prepared.facts, c.device.axis);
   RecordedServer server(prepared, folder, wishes);
-  BenchView bench(server.link());
+  const char* const token = std::getenv("DRIVEBENCH_TOKEN");
+  BenchView bench(server.link(), token != nullptr ? token : "");
   const std::string failure = await_case(bench, place, c, prepared.facts);
   const ServerReport report = server.end();
   regression::MissedTicks missed;
