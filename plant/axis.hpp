@@ -13,6 +13,15 @@
 
 namespace drivebench {
 
+/// What the sensors of a sample do not tell at an instant within a tick.
+struct GateTruth {
+  ThreePhase current_a{};
+  double torque_nm = 0.0;
+  double load_nm = 0.0;
+  double magnetic_j = 0.0;  ///< in the field of the machine
+  std::uint32_t hall_lines = 0;
+};
+
 /// One emulated drive train: drive, machine, shaft, load and sensors.
 class Axis {
  public:
@@ -36,6 +45,21 @@ class Axis {
   /// voltages, and a latched fault of one is that of both. The drive parameters of both must be equal.
   static void advance_on_one_amplifier(Axis& first, Axis& second, const PhaseCommand& command,
                                        Tick tick) noexcept;
+
+  // A tick in parts, at gate level (GateAxis), where the legs of a switched inverter are at levels and no
+  // command is in force: open_tick(), run_part() from its start to its end, close_tick().
+
+  void open_tick(Tick tick) noexcept;
+  /// From start_s to end_s within the tick, at most a step. Whether the state is finite; if not, the axis
+  /// stands where it was and has the fault `diverged`.
+  bool run_part(const LegLevels& levels, double start_s, double end_s) noexcept;
+  void close_tick() noexcept;
+  /// Back to a state that was kept within this tick or one before it, opened and not closed.
+  void go_back(const AxisState& state, Tick tick) noexcept;
+  /// From now on parts report to this one; null: to none.
+  void report_to(GateTap* tap) noexcept { core_.tap = tap; }
+  /// Torque, energy and currents at this instant.
+  GateTruth gate_truth() const noexcept;
 
   /// Sensors and truth at the start of `tick`, after the advance that led there: a pure function of state and
   /// tick. The bench's state of commands, leases and late ticks is not in it.

@@ -36,9 +36,13 @@ const abi::InprocLibrary& load_inproc_library() {
   return inproc;
 }
 
+std::string bench_file(std::string_view bench) {
+  return installation::find_file("benches", "bench file", bench).string();
+}
+
 std::unique_ptr<abi::Backend> open_inproc(std::string_view bench) {
   std::string error;
-  const std::string file = installation::find_file("benches", "bench file", bench).string();
+  const std::string file = bench_file(bench);
   std::unique_ptr<abi::Backend> backend(load_inproc_library().open(file.c_str(), error));
   if (backend == nullptr) throw OpenError(DRIVEBENCH_NO_BENCH, error);
   return backend;
@@ -74,6 +78,25 @@ std::unique_ptr<abi::Backend> open_backend(std::string_view address, const link:
     throw OpenError(static_cast<int>(refusal.code()), refusal.what());
   } catch (const link::LinkError& none) {
     throw OpenError(DRIVEBENCH_NO_BENCH, none.what());
+  } catch (const installation::NotFound& not_found) {
+    throw OpenError(DRIVEBENCH_NO_BENCH, not_found.what());
+  }
+}
+
+std::unique_ptr<abi::Bridge> open_bridge(std::string_view address, std::uint32_t axis) {
+  if (!address.starts_with(kInproc)) {
+    throw OpenError(DRIVEBENCH_NOT_AVAILABLE,
+                    "the gate level works in process only: the address must be "
+                    "inproc:BENCH, not " +
+                        std::string(address));
+  }
+  try {
+    int code = DRIVEBENCH_NO_BENCH;
+    std::string error;
+    const std::string file = bench_file(address.substr(kInproc.size()));
+    std::unique_ptr<abi::Bridge> bridge(load_inproc_library().open_bridge(file.c_str(), axis, code, error));
+    if (bridge == nullptr) throw OpenError(code, error);
+    return bridge;
   } catch (const installation::NotFound& not_found) {
     throw OpenError(DRIVEBENCH_NO_BENCH, not_found.what());
   }

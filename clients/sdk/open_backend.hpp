@@ -1,11 +1,13 @@
 #pragma once
 
+#include <cstdint>
 #include <memory>
 #include <stdexcept>
 #include <string_view>
 
 #include "clients/link/tcp/tcp_link.hpp"
 #include "protocols/abi/backend.hpp"
+#include "protocols/abi/bridge.hpp"
 
 namespace drivebench::sdk {
 
@@ -21,5 +23,8 @@ class OpenError : public std::runtime_error {
 
 /// Opens the way that the address names. `options` are for links. Throws OpenError.
 std::unique_ptr<abi::Backend> open_backend(std::string_view address, const link::LinkOptions& options);
+
+/// Opens an axis of "inproc:BENCH" at gate level. Throws OpenError.
+std::unique_ptr<abi::Bridge> open_bridge(std::string_view address, std::uint32_t axis);
 
 }  // namespace drivebench::sdk

@@ -132,6 +132,10 @@ class Drive {
   /// machine shares with another one, with constant voltages. A wire that breaks is this machine's own.
   void share_output(const TerminalDrive& out) noexcept;
 
+  /// From here on in this tick the legs of a switched inverter are at these levels, whatever the command
+  /// says. Faults that hold a terminal, and switch_off(), go before.
+  void hold_legs(DriveMemory& m, const LegLevels& levels) noexcept;
+
   /// Whether at() gives the same during what is left of the tick, whatever the machine does.
   bool steady(const DriveMemory& m) const noexcept { return steady_ && !switches_ && m.switched_off == 0.0; }
   /// Whether at() changes during what is left of the tick by the switches alone: see switch_terminals().

@@ -104,4 +104,16 @@ void Drive::share_output(const TerminalDrive& out) noexcept {
   switches_ = has_edges_ = follows_ = false;
 }
 
+void Drive::hold_legs(DriveMemory& m, const LegLevels& levels) noexcept {
+  Order& order = orders_[1];
+  order.gates = Gates::kEdges;
+  order.legs_off = 0;
+  order.setpoint = {};
+  order.origin_s = 0.0;
+  order.pattern.set_levels(levels, terminals_);
+  later_s_ = 0.0;
+  m.pwm_segment = 0;
+  steady_ = switches_ = has_edges_ = false;
+}
+
 }  // namespace drivebench

@@ -193,13 +193,17 @@ void SwitchingPattern::set_edges(const EdgeHistory& edges, int terminals, double
   for (std::size_t n = 0; n < changes.count; ++n) {
     const Change& change = changes.change[n];
     if (change.at_s > 0.0) segments_[segment++] = {.until_s = change.at_s, .passed = passed};
-    const std::uint64_t code = change.level == LegLevel::kHigh  ? kHigh
-                               : change.level == LegLevel::kLow ? kLow
-                                                                : kOff;
     passed &= ~(std::uint64_t{7} << (kBits * change.leg));
-    passed |= code << (kBits * change.leg);
+    passed |= code_of(change.level) << (kBits * change.leg);
   }
   segments_[segment] = {.until_s = kNever, .passed = passed};
+}
+
+void SwitchingPattern::set_levels(const LegLevels& levels, int terminals) noexcept {
+  std::uint64_t passed = 0;
+  for (std::size_t k = 0; k < static_cast<std::size_t>(terminals); ++k)
+    passed |= code_of(levels[k]) << (kBits * k);
+  segments_[0] = {.until_s = kNever, .passed = passed};
 }
 
 }  // namespace drivebench

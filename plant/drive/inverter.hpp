@@ -83,6 +83,9 @@ class SwitchingPattern {
   void set_edges(const EdgeHistory& edges, int terminals, double dead_time_s, double period_s,
                  std::uint32_t legs_off = 0) noexcept;
 
+  /// Legs that stay at one level each; kNone is off.
+  void set_levels(const LegLevels& levels, int terminals) noexcept;
+
   /// The segment between two commutations in which this instant of the period lies. The search starts at
   /// `hint`, which speeds it up and changes nothing.
   std::size_t segment_at(double instant_s, std::size_t hint) const noexcept {
@@ -114,6 +117,10 @@ class SwitchingPattern {
   static constexpr std::uint64_t kLow = 0;   ///< of them leave the lower switch closed
   static constexpr std::uint64_t kHigh = 2;  ///< make the upper switch closed
   static constexpr std::uint64_t kOff = 5;   ///< in place of their number: the leg is off
+
+  static constexpr std::uint64_t code_of(LegLevel level) noexcept {
+    return level == LegLevel::kHigh ? kHigh : (level == LegLevel::kLow ? kLow : kOff);
+  }
 
   // The connection of a terminal after so many commutations: lower switch, dead time, upper switch, dead
   // time, lower switch; then that of a leg that is off.

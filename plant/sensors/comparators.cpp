@@ -160,7 +160,7 @@ ComparatorMemory Comparators::settled(double link_v) const noexcept {
 }
 
 void Comparators::follow(ComparatorMemory& m, Tick tick, double start_s, double duration_s,
-                         const TerminalPath& path) const noexcept {
+                         const TerminalPath& path, EventLog* log) const noexcept {
   const auto reference_v = [&](const ThreePhase& v) noexcept {
     if (p_.reference == ComparatorReference::kVirtualNeutral) return mean(v);
     return p_.reference == ComparatorReference::kHalfLink ? 0.5 * path.link_v : p_.reference_v;
@@ -182,7 +182,7 @@ void Comparators::follow(ComparatorMemory& m, Tick tick, double start_s, double 
     const auto [lowest_v, highest_v] = std::minmax({before_v, u.start_v, u.control_v(), u.end_v});
     const Span span{.lowest_v = lowest_v, .highest_v = highest_v};
     if (away_v(m, k, span) < kMostNoise * p_.noise_rms_v) {
-      switch_within(m, {k, tick, start_s}, input, span, duration_s);
+      switch_within(m, {k, tick, start_s, log}, input, span, duration_s);
     }
     y = filters ? input.at(duration_s, decay) : u.end_v;
   }
@@ -235,6 +235,11 @@ void Comparators::switch_within(ComparatorMemory& m, const Place& place, const I
     ++m.edges[index_of(place.terminal)];
     m.edge_tick[index_of(place.terminal)] = place.tick;
     m.edge_s[index_of(place.terminal)] = place.start_s + t;
+    if (place.log == nullptr) return;
+    place.log->add({.at_s = place.start_s + t,
+                    .kind = EventKind::kComparator,
+                    .channel = static_cast<std::uint32_t>(place.terminal),
+                    .level = (m.levels & bit) != 0 ? 1U : 0U});
   };
   double v = input.at(from_s) + added_v;
   if (is_beyond(v)) switch_at(from_s);  // a jump of the voltage or of the noise

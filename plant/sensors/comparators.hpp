@@ -4,6 +4,7 @@
 #include <cstdint>
 
 #include "plant/math/frames.hpp"
+#include "plant/sensors/event_log.hpp"
 #include "plant/tick.hpp"
 #include "protocols/signals/sample.hpp"
 
@@ -59,9 +60,9 @@ class Comparators {
 
   /// As if the terminals had been in the middle of the link for ever.
   ComparatorMemory settled(double link_v) const noexcept;
-  /// The interval from start_s within the tick.
-  void follow(ComparatorMemory& m, Tick tick, double start_s, double duration_s,
-              const TerminalPath& path) const noexcept;
+  /// The interval from start_s within the tick. Its edges go to `log` as well, unless that is null.
+  void follow(ComparatorMemory& m, Tick tick, double start_s, double duration_s, const TerminalPath& path,
+              EventLog* log = nullptr) const noexcept;
   /// Their signals at the start of `tick`.
   void read(const ComparatorMemory& m, Tick tick, Sample& sample) const noexcept;
 
@@ -72,6 +73,7 @@ class Comparators {
     int terminal;
     Tick tick;
     double start_s;
+    EventLog* log;
   };
 
   /// What the input is between.

@@ -21,4 +21,7 @@ struct HallParameters {
 std::uint32_t hall_lines(const HallParameters& p, const InjectedFaults& faults,
                          double electrical_rad) noexcept;
 
+/// The same in a sector of 60 electrical degrees: sector 0 is -30..30 degrees, and they go on with the turns.
+std::uint32_t hall_lines_in(std::int64_t sector, const InjectedFaults& faults) noexcept;
+
 }  // namespace drivebench

@@ -34,6 +34,9 @@ class DriveTrain final : public Train {
   void run_part(AxisCore& core, AxisState& state, double start_s, double end_s,
                 double load_nm) noexcept override;
   MachineTruth truth(const AxisState& state, const RotorMotion& motion) const noexcept override;
+  double stored_energy_j(const AxisState& state, const RotorMotion& motion) const noexcept override {
+    return drivebench::stored_energy_j(c_, machine_of(state), turned(motion));
+  }
 
   void open(AxisCore& core, AxisState& state, double start_s, double duration_s,
             const RotorMotion& motion) noexcept override;
@@ -97,6 +100,16 @@ class DriveTrain final : public Train {
     const RotorMotion& to_motion;
   };
 
+  /// What GateSums integrates, at one instant of a piece.
+  struct Instant {
+    ThreePhase current_a;
+    double link_a;
+    double electrical_w;
+    double torque_nm;
+    double shaft_w;
+    double copper_w;
+  };
+
   static State machine_of(const AxisState& state) noexcept;
   static void keep_machine(AxisState& state, const State& x) noexcept;
   static Shaft shaft_of(const AxisState& state) noexcept;
@@ -129,6 +142,8 @@ class DriveTrain final : public Train {
   /// The input of the windings with what the closed switches take.
   TerminalInput input_behind_switches(Connection connection, const State& x,
                                       const RotorMotion& motion) const noexcept;
+  /// The same voltages with those that the closed switches have on the side of the link.
+  PhaseValues before_switches(Connection connection, PhaseValues voltage_v) const noexcept;
   /// The voltages of the terminals at both ends of the piece and in its mean.
   void take_switch_voltages(Connection connection, const PhaseValues& from_a,
                             const PhaseValues& to_a) noexcept;
@@ -189,6 +204,13 @@ class DriveTrain final : public Train {
   /// The voltages of all terminals where the piece has come to this state of the machine.
   PhaseValues within_piece_v(const AxisCore& core, TerminalSet floating, const State& x,
                              const RotorMotion& motion, const PhaseValues& driven_v) const noexcept;
+  Instant instant_of(const AxisCore& core, const State& x, const RotorMotion& motion,
+                     const PhaseValues& current_a, const PhaseValues& voltage_v) const noexcept;
+  /// A piece of known currents into GateTap::sums, the terminals' voltages aside.
+  [[gnu::noinline]] void add_sums(const AxisCore& core, const AxisState& state, const Passed& passed,
+                                  const PhaseValues& from_a) const noexcept;
+  /// Currents that have died, into GateTap::events.
+  [[gnu::noinline]] void tell_deaths(const AxisCore& core, TerminalSet died, double at_s) const noexcept;
   void end_run(const AxisCore& core, AxisState& state, const State& x, const RotorMotion& motion) noexcept;
   /// Sets blocked currents to zero again, from which rounding lets them drift.
   void keep_open(const AxisCore& core, const AxisState& state, State& x,

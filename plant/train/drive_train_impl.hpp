@@ -2,6 +2,7 @@
 
 #include "plant/train/drive_train_events.hpp"
 #include "plant/train/drive_train_switches.hpp"
+#include "plant/train/drive_train_tap.hpp"
 #include "plant/train/drive_train_terminals.hpp"
 
 namespace drivebench {
@@ -96,6 +97,7 @@ void DriveTrain<Machine, Shaft>::finish_piece(AxisCore& core, AxisState& state,
       state.heat_j += 0.5 * duration_s * (losses_w(c_, from, from_motion) + losses_w(c_, to, to_motion));
     }
     if (core.p.sensors.follow_terminals()) follow_terminals(core, state, passed, after.voltage_v);
+    if (core.tap != nullptr) add_sums(core, state, passed, from_a);
     follow_piece(core, state, start_s, duration_s, piece_.drive, piece_.circuit, before, after);
   }
   core.record({.start_s = start_s,
@@ -116,7 +118,12 @@ void DriveTrain<Machine, Shaft>::run_piece(AxisCore& core, AxisState& state, Who
     const Whole from = x;
     const RotorMotion from_motion = motion_of(from);
     piece_.current_a = currents(core, state, from.machine, from_motion);
-    if (core.breaks && meet_break(core, state, start_s, piece_.current_a)) piece_.stays = false;
+    if (core.breaks && meet_break(core, state, start_s, piece_.current_a)) {
+      piece_.stays = false;
+      if (core.tap != nullptr) {
+        core.tap->events.add({.at_s = start_s, .kind = EventKind::kBreak, .channel = 0, .level = 1});
+      }
+    }
     const double stop_s = piece_stop_s(core, state, start_s, end_s);
     const double duration_s = stop_s - start_s;
     connect_piece(core, state, start_s, duration_s, from.machine, from_motion);
@@ -129,6 +136,7 @@ void DriveTrain<Machine, Shaft>::run_piece(AxisCore& core, AxisState& state, Who
     const bool may_cut =
         piece_.circuit.dying != 0 || core.shaft_has_events || Machine::kHasCorners || piece_.has_switching;
     Cut cut;
+    const TerminalSet open_before = state.open_terminals;
     if (may_cut && events < kMaxEvents) {
       cut = piece_.has_switching
                 ? cut_at_event<true>(core, state, from, x, start_s, duration_s, branch, load_nm)
@@ -141,6 +149,7 @@ void DriveTrain<Machine, Shaft>::run_piece(AxisCore& core, AxisState& state, Who
     const double passed_s = cut.fraction < 1.0 ? cut.fraction * duration_s : duration_s;
     finish_piece(core, state, {start_s, passed_s, from.machine, x.machine, from_motion, motion_of(x)});
     start_s = cut.fraction < 1.0 ? start_s + passed_s : stop_s;
+    if (core.tap != nullptr) tell_deaths(core, state.open_terminals & ~open_before, start_s);
     if (piece_.watched && cut.electrical_event >= first_break_event()) pull_break(core, state, start_s);
   }
 }

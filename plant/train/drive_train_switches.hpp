@@ -44,16 +44,22 @@ void DriveTrain<Machine, Shaft>::step_behind_switches(const AxisCore& core, Whol
   });
 }
 
+template <class Machine, class Shaft>
+PhaseValues DriveTrain<Machine, Shaft>::before_switches(Connection connection,
+                                                        PhaseValues voltage_v) const noexcept {
+  const TerminalSet driven = driven_terminals(connection, piece_.drive);
+  if ((driven & 1u) != 0) voltage_v.a = piece_.drive.start_v.a;
+  if ((driven & 2u) != 0) voltage_v.b = piece_.drive.start_v.b;
+  if ((driven & 4u) != 0) voltage_v.c = piece_.drive.start_v.c;
+  return voltage_v;
+}
+
 /// A current goes nearly linearly within a piece; between the ends of a piece it is taken so for the mean.
 template <class Machine, class Shaft>
 void DriveTrain<Machine, Shaft>::take_switch_voltages(Connection connection, const PhaseValues& from_a,
                                                       const PhaseValues& to_a) noexcept {
   TerminalCircuit& circuit = piece_.circuit;
-  const TerminalSet driven = driven_terminals(connection, piece_.drive);
-  if ((driven & 1u) != 0) circuit.start_v.a = piece_.drive.start_v.a;
-  if ((driven & 2u) != 0) circuit.start_v.b = piece_.drive.start_v.b;
-  if ((driven & 4u) != 0) circuit.start_v.c = piece_.drive.start_v.c;
-  const PhaseValues ideal_v = circuit.start_v;
+  const PhaseValues ideal_v = before_switches(connection, circuit.start_v);
   const auto half = [](double x, double y) noexcept { return 0.5 * (x + y); };
   circuit.start_v = behind_switches(connection, piece_.drive, ideal_v, from_a);
   circuit.mean_v = behind_switches(connection, piece_.drive, ideal_v, by_terminal(half, from_a, to_a));
@@ -66,12 +72,9 @@ PhaseValues DriveTrain<Machine, Shaft>::floating_within(const AxisCore& core, co
   if (piece_.floats_alone) return open_terminal_voltages(core.connection, open_v(x, motion), 0.0);
   const PhaseValues current_a =
       terminal_currents(core.connection, winding_currents(c_, x, motion), piece_.off);
-  PhaseValues held_v = piece_.circuit.start_v;
   const TerminalSet driven = driven_terminals(core.connection, piece_.drive);
-  if ((driven & 1u) != 0) held_v.a = piece_.drive.start_v.a;
-  if ((driven & 2u) != 0) held_v.b = piece_.drive.start_v.b;
-  if ((driven & 4u) != 0) held_v.c = piece_.drive.start_v.c;
-  held_v = behind_switches(core.connection, piece_.drive, held_v, current_a);
+  const PhaseValues held_v = behind_switches(
+      core.connection, piece_.drive, before_switches(core.connection, piece_.circuit.start_v), current_a);
   return with_floating(core.connection, piece_.off & ~driven, held_v,
                        floating_v(x, motion, input_behind_switches(core.connection, x, motion)));
 }

@@ -203,15 +203,26 @@ void DriveTrain<Machine, Shaft>::follow_terminals(const AxisCore& core, AxisStat
     state.terminal_mean_v = by_phase(add, state.terminal_mean_v, against_rail(mean_v, floating));
     state.terminal_v = against_rail(phases_of(end_v), state.open_terminals & ~driven);
   }
-  if (!core.comparators.enabled()) return;
+  if (!core.comparators.enabled() && core.tap == nullptr) return;
   const PhaseValues half_v =
       floating == 0 ? middle_v()
                     : within_piece_v(core, floating, middle_of(passed), middle_motion(passed), middle_v());
-  core.comparators.follow(state.comparators, core.tick, passed.start_s, passed.duration_s,
-                          {.start_v = against_rail(phases_of(first_v), floating),
-                           .middle_v = against_rail(phases_of(half_v), floating),
-                           .end_v = against_rail(phases_of(last_v), floating),
-                           .link_v = state.drive.bus_v});
+  const TerminalPath path{.start_v = against_rail(phases_of(first_v), floating),
+                          .middle_v = against_rail(phases_of(half_v), floating),
+                          .end_v = against_rail(phases_of(last_v), floating),
+                          .link_v = state.drive.bus_v};
+  EventLog* log = nullptr;
+  if (core.tap != nullptr) {
+    log = &core.tap->events;
+    const double sixth_s = passed.duration_s / 6.0;
+    const auto add = [sixth_s](double sum, double start, double middle, double end) noexcept {
+      return sum + sixth_s * (start + 4.0 * middle + end);
+    };
+    ThreePhase& sum_vs = core.tap->sums.terminal_vs;
+    sum_vs = by_phase(add, sum_vs, path.start_v, path.middle_v, path.end_v);
+  }
+  if (!core.comparators.enabled()) return;
+  core.comparators.follow(state.comparators, core.tick, passed.start_s, passed.duration_s, path, log);
 }
 
 template <class Machine, class Shaft>

@@ -11,6 +11,7 @@
 #include "plant/axis_state.hpp"
 #include "plant/faults.hpp"
 #include "plant/train/events.hpp"
+#include "plant/train/gate_tap.hpp"
 
 namespace drivebench {
 
@@ -42,6 +43,7 @@ struct AxisCore {
   std::uint64_t injected_bits = 0;  ///< of the injected faults, as a sample shows them
   std::int64_t last_tick_turn = 0;
   EncoderState last_tick_encoder{};  ///< at its start
+  GateTap* tap = nullptr;            ///< to which pieces report at gate level
 
   std::span<const AngleSegment> last_tick() const noexcept { return {segments.data(), segment_count}; }
   void record(const AngleSegment& segment) noexcept {
@@ -78,6 +80,8 @@ class Train {
                         double load_nm) noexcept = 0;
 
   virtual MachineTruth truth(const AxisState& state, const RotorMotion& motion) const noexcept = 0;
+  /// In the magnetic field.
+  virtual double stored_energy_j(const AxisState& state, const RotorMotion& motion) const noexcept = 0;
 
   // Stage by stage, for two machines on one shaft. Order: open(), then for each stage torque_nm_at() of
   // both and stage() of both, then find_corner() and add_events(); shorten() and the stages again until an

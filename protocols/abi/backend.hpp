@@ -7,6 +7,7 @@
 #include <utility>
 #include <vector>
 
+#include "protocols/abi/bridge.hpp"
 #include "protocols/abi/drivebench.h"
 #include "protocols/signals/sample.hpp"
 
@@ -83,6 +84,8 @@ struct InprocLibrary {
   std::size_t sample_size;
   /// Opens the bench file. Null after a failure, whose sentence is then in `error`.
   Backend* (*open)(const char* bench_file, std::string& error) noexcept;
+  /// The same of an axis at gate level; `code` is then a drivebench_code.
+  Bridge* (*open_bridge)(const char* bench_file, std::uint32_t axis, int& code, std::string& error) noexcept;
 };
 inline constexpr const char* kInprocLibrary = "libdrivebench-inproc.so.1";
 inline constexpr const char* kInprocSymbol = "drivebench_inproc";

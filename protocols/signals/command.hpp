@@ -37,6 +37,9 @@ enum class LegLevel : std::uint32_t {
   kHigh = 3,  ///< at the positive rail
 };
 
+/// The positions of legs a, b, c.
+using LegLevels = std::array<LegLevel, 3>;
+
 /// From this instant of the tick on a leg has this position.
 class LegEdge {
  public:

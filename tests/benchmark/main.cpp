@@ -28,6 +28,7 @@ constexpr std::array kMeasurements = std::to_array<Measurement>({
     {"exchange", "lockstep exchanges against a ping-pong", measure_exchange},
     {"shm", "lockstep exchanges through shared memory against a futex", measure_shared_memory},
     {"sdk", "a step behind the C ABI in process against the bench itself", measure_sdk},
+    {"bridge", "the gate level: idle runs, steps with an edge, a speed controller", measure_bridge},
     {"experiment", "data of an experiment against a copy of the same bytes", measure_experiment},
     {"identification", "an induction motor, 800 random motors", measure_identification},
     {"suite", "a regression suite over presets and over a program", measure_suite},

@@ -20,6 +20,9 @@ std::vector<Row> measure_exchange();
 std::vector<Row> measure_shared_memory();
 /// A step of the bench in process behind the C ABI against the same step without it.
 std::vector<Row> measure_sdk();
+/// The gate level behind the C ABI: a run in which nothing is due, one to the next edge, and the time that a
+/// simulated second of a speed controller takes.
+std::vector<Row> measure_bridge();
 /// The pacers against a bare clock_nanosleep loop; the server in real time.
 std::vector<Row> measure_realtime();
 /// Ten axes at 20 kHz into the recorder.

@@ -45,7 +45,8 @@ class Install(unittest.TestCase):
     # Catches: a header that only C++ or only the checkout can read, flags that find no library, a bench that is found
     # only from the checkout.
     def test_cc_and_pkg_config_build_the_examples_in_c(self):
-        for source, says in (("blink.c", SPINS), ("foc.c", "q current"), ("six_step.c", ", 0 without a crossing")):
+        for source, says in (("blink.c", SPINS), ("foc.c", "q current"), ("six_step.c", ", 0 without a crossing"),
+                             ("six_step_gates.c", ", 0 without a crossing")):
             run("cc", "-std=c99", "-Wall", "-Wextra", "-pedantic", "-Werror", "-O1", source, "-o", "example", *self.flags("--cflags", "--libs"),
                 f"-Wl,-rpath,{self.libraries}", "-lm", cwd=self.folder)
             self.assertIn(says, run("./example", cwd=self.folder))

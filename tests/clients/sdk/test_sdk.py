@@ -13,6 +13,7 @@ from wire_test import PATIENT_TEXT  # noqa: E402
 
 EXERCISE = SERVER.with_name("sdk_exercise")
 SIX_STEP = SERVER.with_name("six_step")
+SIX_STEP_GATES = SERVER.with_name("six_step_gates")
 MOTORS = str(BENCHES.parent / "motors")
 
 
@@ -94,6 +95,21 @@ class Sdk(unittest.TestCase):
         for other in said[1:]:
             self.assertEqual(said[0], other)
         self.assertEqual(replay.returncode, 0, replay.stdout + replay.stderr)
+
+    # The same firmware with a scheduler of its own, at gate level. Catches: an edge that is lost or comes at another time, legs that act
+    # late, a load that holds from another instant, an energy that is not that of the link.
+    def test_a_sensorless_run_up_at_gate_level(self):
+        said = run_of(SIX_STEP_GATES, "inproc:esc")
+        before, lowest, after = map(int, re.match(r"(\d+) rpm before the load step, at least (\d+) after it, (\d+) at the end", said).groups())
+        self.assertLess(abs(before - 0.8 * 900 * 14.8), 60, said)
+        self.assertLess(lowest, before - 30, said)
+        self.assertLess(abs(after - before), 30, said)
+        self.assertIn(", 0 without a crossing", said)
+        ampere, volt, watt, shaft_watt, copper_watt = map(float, re.search(
+            r"after the step ([\d.]+) A at ([\d.]+) V: ([\d.]+) W, of which ([\d.]+) W turn the propeller and ([\d.]+) W heat", said).groups())
+        self.assertLess(abs(watt - ampere * volt), 0.01 * watt, said)
+        self.assertLess(abs(watt - shaft_watt - copper_watt), 0.01 * watt, said)
+        self.assertEqual(said, run_of(SIX_STEP_GATES, "inproc:esc"))
 
     # The same firmware on the parts of a board: R_ds(on), diodes, shunts, break input. Catches: a key that the bench in process, the
     # server or a replay leaves out, diodes that take no voltage, a break input that trips in a run that is sound.

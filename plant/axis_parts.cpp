@@ -1,0 +1,52 @@
+// A tick in parts, for GateAxis.
+#include "plant/axis.hpp"
+#include "plant/drive/phases.hpp"
+
+namespace drivebench {
+
+void Axis::open_tick(Tick tick) noexcept {
+  begin_tick({}, tick);
+  core_.follows = true;  // every piece reports
+}
+
+bool Axis::run_part(const LegLevels& levels, double start_s, double end_s) noexcept {
+  const MotionState before = motion();
+  core_.segment_count = 0;
+  core_.drive.hold_legs(state_.drive, levels);
+  train_->run_part(core_, state_, start_s, end_s, load_at(core_.tick));
+  if (!finite()) {
+    hold(before);
+    return false;
+  }
+  look_inside();
+  check_over_current(core_, state_,
+                     terminal_currents(core_.connection, truth_.current_a, state_.open_terminals));
+  core_.encoder.follow(state_.encoder, last_tick(), core_.tick, core_.last_tick_turn, state_.injected);
+  return true;
+}
+
+void Axis::close_tick() noexcept {
+  core_.segment_count = 0;  // the encoder has followed them
+  end_tick(motion(), core_.tick);
+}
+
+void Axis::go_back(const AxisState& state, Tick tick) noexcept {
+  state_ = state;
+  open_tick(tick);
+  state_ = state;
+  adjust();
+}
+
+GateTruth Axis::gate_truth() const noexcept {
+  const RotorMotion motion{
+      .angle_rad = state_.shaft.angle_rad, .speed_rad_s = state_.shaft.speed_rad_s, .electrical = {1.0, 0.0}};
+  const MachineTruth truth = train_->truth(state_, motion);
+  return {.current_a = phases_of(terminal_currents(core_.connection, truth.current_a, state_.open_terminals)),
+          .torque_nm = truth.torque_nm,
+          .load_nm = load_at(core_.tick),
+          .magnetic_j = train_->stored_energy_j(state_, motion),
+          .hall_lines =
+              hall_lines(core_.p.sensors.hall, state_.injected, core_.pole_pairs * state_.shaft.angle_rad)};
+}
+
+}  // namespace drivebench

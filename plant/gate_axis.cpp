@@ -1,0 +1,286 @@
+#include "plant/gate_axis.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <cstring>
+#include <type_traits>
+#include <variant>
+
+namespace drivebench {
+namespace {
+
+AxisParameters with_terminals(AxisParameters p) {
+  p.sensors.terminals = true;
+  return p;
+}
+
+double pole_pairs_of_machine(const AxisParameters& p) {
+  return std::visit([](const auto& machine) { return pole_pairs_of(machine); }, p.machine);
+}
+
+}  // namespace
+
+GateAxis::GateAxis(const AxisParameters& p, std::int64_t period_ns, int substeps, std::uint64_t seed,
+                   std::uint64_t index)
+    : axis_(with_terminals(p), {.period_s = 1e-9 * static_cast<double>(period_ns), .substeps = substeps},
+            seed, index),
+      hall_({.counts_per_revolution = 6 * static_cast<int>(pole_pairs_of_machine(p)),
+             .half_count_offset = true},
+            1e-9 * static_cast<double>(period_ns)),
+      pole_pairs_(pole_pairs_of_machine(p)),
+      period_(1000 * period_ns),
+      substeps_(substeps) {
+  constexpr std::size_t kRoomForEvents = 1024;
+  log_.reserve(kRoomForEvents);
+  axis_.report_to(&tap_);
+  clock_.hall_count = hall_.count_at(-p.sensors.hall.offset_rad / pole_pairs_, 0);
+  keep(base_);
+  told_ = {.levels = axis_.state().comparators.levels, .hall_count = clock_.hall_count};
+}
+
+double GateAxis::within_tick_s(Picoseconds at) const noexcept {
+  return 1e-12 * static_cast<double>(at - tick() * period_);
+}
+
+Picoseconds GateAxis::at_of(double within_tick_s, Picoseconds from) const noexcept {
+  return std::max(from, tick() * period_ + static_cast<Picoseconds>(std::llround(1e12 * within_tick_s)));
+}
+
+Picoseconds GateAxis::grid_after(Picoseconds at) const noexcept {
+  const Picoseconds start = at / period_ * period_;
+  const Picoseconds step = (at - start) * substeps_ / period_;
+  for (Picoseconds n = step;; ++n) {
+    const Picoseconds grid = start + n * period_ / substeps_;
+    if (grid > at) return grid;
+  }
+}
+
+void GateAxis::keep(Moment& moment) const {
+  moment.clock = clock_;
+  moment.sums = tap_.sums;
+  moment.axis = axis_.state();
+}
+
+void GateAxis::go_back(const AxisState& state) {
+  if (clock_.tick_open != 0) {
+    axis_.go_back(state, tick());
+  } else {
+    axis_.restore(state);
+  }
+}
+
+void GateAxis::go_back(const Moment& moment) {
+  clock_ = moment.clock;
+  tap_.sums = moment.sums;
+  go_back(moment.axis);
+}
+
+void GateAxis::extend(Picoseconds limit) {
+  const Picoseconds from = clock_.at;
+  if (clock_.tick_open == 0) axis_.open_tick(tick());
+  clock_.tick_open = 1;
+  Picoseconds to = std::min(limit, grid_after(from));
+  LegLevels levels{};
+  for (std::size_t k = 0; k < levels.size(); ++k) {
+    clock_.legs[k].go_to(from);
+    levels[k] = clock_.legs[k].level();
+    to = std::min(to, clock_.legs[k].next(from));
+  }
+  tap_.events.clear();
+  if (!diverged() && axis_.run_part(levels, within_tick_s(from), within_tick_s(to))) log_events(from);
+  const Picoseconds tick_end = (tick() + 1) * period_;
+  clock_.at = to;
+  if (to != tick_end) return;
+  if (!diverged()) axis_.close_tick();
+  clock_.tick_open = 0;
+}
+
+void GateAxis::log_events(Picoseconds from) {
+  const std::size_t first = log_.size();
+  for (std::size_t n = 0; n < tap_.events.size(); ++n) {
+    const PlantEvent& event = tap_.events[n];
+    log_one({.edge = {.at = at_of(event.at_s, from),
+                      .kind = event.kind,
+                      .channel = event.channel,
+                      .level = event.level}},
+            first);
+  }
+  if (axis_.parameters().sensors.hall.enabled) log_hall(from);
+}
+
+/// In the order of time; events of one instant in the order in which they came.
+void GateAxis::log_one(const Logged& event, std::size_t first) {
+  std::size_t place = log_.size();
+  while (place > first && log_[place - 1].edge.at > event.edge.at)
+    --place;
+  log_.insert(log_.begin() + static_cast<std::ptrdiff_t>(place), event);
+}
+
+void GateAxis::log_hall(Picoseconds from) {
+  const std::size_t first = log_.size();
+  const HallParameters& p = axis_.parameters().sensors.hall;
+  const InjectedFaults& faults = axis_.injected();
+  const double offset_rad = (p.offset_rad + faults.hall_offset) / pole_pairs_;
+  for (AngleSegment segment : axis_.last_tick()) {
+    segment.start_rad -= offset_rad;
+    segment.end_rad -= offset_rad;
+    hall_.for_each_edge(std::span(&segment, 1), axis_.last_tick_turn(), clock_.hall_count,
+                        [&](const Edge& edge) {
+                          const std::uint32_t before = hall_lines_in(clock_.hall_count, faults);
+                          const std::uint32_t changed = before ^ hall_lines_in(edge.count, faults);
+                          clock_.hall_count = edge.count;
+                          for (std::uint32_t line = 0; line < 3; ++line) {
+                            if ((changed >> line & 1U) == 0) continue;
+                            log_one({.edge = {.at = at_of(edge.time_s, from),
+                                              .kind = EventKind::kHall,
+                                              .channel = line,
+                                              .level = ~before >> line & 1U},
+                                     .hall_count = edge.count},
+                                    first);
+                          }
+                        });
+  }
+}
+
+void GateAxis::tell(const Logged& event) noexcept {
+  if (event.edge.kind == EventKind::kHall) told_.hall_count = event.hall_count;
+  if (event.edge.kind != EventKind::kComparator) return;
+  told_.levels ^= std::uint64_t{1} << event.edge.channel;
+  ++told_.edges[event.edge.channel];
+}
+
+void GateAxis::run_to_now() {
+  const std::size_t known = log_.size();
+  go_back(base_);
+  while (clock_.at < now_) {
+    extend(now_);
+    log_.resize(known);
+  }
+  clock_.hall_count = told_.hall_count;
+  if (axis_.state().comparators.levels == told_.levels && axis_.state().comparators.edges == told_.edges)
+    return;
+  AxisState state = axis_.state();
+  state.comparators.levels = told_.levels;
+  state.comparators.edges = told_.edges;
+  go_back(state);
+}
+
+void GateAxis::stop_here() {
+  const auto passed = log_.begin() + static_cast<std::ptrdiff_t>(passed_);
+  auto later = passed;
+  for (; later != log_.end() && later->edge.at <= now_; ++later) {
+    if (static_cast<std::size_t>(later - log_.begin()) >= told_count_) tell(*later);
+  }
+  log_.erase(later, log_.end());
+  log_.erase(log_.begin(), passed);
+  passed_ = 0;
+  told_count_ = log_.size();
+  if (clock_.at != now_) run_to_now();
+  keep(base_);
+}
+
+void GateAxis::set_leg(std::size_t leg, const LegSetting& setting) {
+  if (clock_.legs[leg].setting() == setting) return;
+  stop_here();
+  clock_.legs[leg].set(setting, now_);
+  keep(base_);
+}
+
+void GateAxis::set_load(double load_nm) {
+  stop_here();
+  axis_.set_load(load_nm, tick(), 0);
+  keep(base_);
+}
+
+void GateAxis::inject(std::size_t row, double value) {
+  stop_here();
+  axis_.inject(row, value);
+  go_back(AxisState(axis_.state()));  // the drive takes its faults
+  keep(base_);
+}
+
+void GateAxis::clear_faults() {
+  stop_here();
+  axis_.clear_faults();
+  keep(base_);
+}
+
+std::size_t GateAxis::run(Picoseconds until, std::span<GateEdge> edges) {
+  std::size_t written = 0;
+  while (true) {
+    while (passed_ < log_.size() && log_[passed_].edge.at <= until) {
+      const Logged& event = log_[passed_++];
+      if (passed_ > told_count_) tell(event);
+      if (edges.empty()) continue;
+      edges[written++] = event.edge;
+      if (written < edges.size()) continue;
+      now_ = event.edge.at;
+      return written;
+    }
+    if (clock_.at >= until) break;
+    log_.clear();
+    passed_ = told_count_ = 0;
+    told_.hall_count = clock_.hall_count;
+    keep(base_);
+    extend(LegTimer::kNever);
+  }
+  now_ = until;
+  return written;
+}
+
+std::optional<GateEdge> GateAxis::next_edge(Picoseconds limit) {
+  while (passed_ == log_.size() && clock_.at < limit)
+    extend(LegTimer::kNever);
+  if (passed_ == log_.size() || log_[passed_].edge.at > limit) return std::nullopt;
+  return log_[passed_].edge;
+}
+
+GateAxis::Now GateAxis::look() {
+  if (clock_.at == now_) return seen();
+  Moment ahead;
+  keep(ahead);
+  run_to_now();
+  const Now now = seen();
+  go_back(ahead);
+  return now;
+}
+
+GateAxis::Now GateAxis::seen() const {
+  Now now{.state = axis_.state(), .truth = axis_.gate_truth(), .sums = tap_.sums};
+  for (std::size_t k = 0; k < now.levels.size(); ++k)
+    now.levels[k] = clock_.legs[k].level();
+  return now;
+}
+
+std::vector<std::byte> GateAxis::save() const {
+  static_assert(std::is_trivially_copyable_v<Saved> && std::is_trivially_copyable_v<Logged>);
+  const Saved saved{.base = base_, .now = now_, .told = told_, .passed = passed_, .told_count = told_count_};
+  std::vector<std::byte> bytes(sizeof(Saved) + told_count_ * sizeof(Logged));
+  std::memcpy(bytes.data(), &saved, sizeof(Saved));
+  std::memcpy(bytes.data() + sizeof(Saved), log_.data(), told_count_ * sizeof(Logged));
+  return bytes;
+}
+
+bool GateAxis::restore(std::span<const std::byte> bytes) {
+  constexpr std::size_t kMostPieces = 100'000;  // that next_edge() had to look at
+  Saved saved;
+  if (bytes.size() < sizeof(Saved)) return false;
+  std::memcpy(&saved, bytes.data(), sizeof(Saved));
+  if (bytes.size() - sizeof(Saved) != saved.told_count * sizeof(Logged)) return false;
+  base_ = saved.base;
+  now_ = saved.now;
+  told_ = saved.told;
+  told_count_ = saved.told_count;
+  passed_ = saved.passed;
+  log_.resize(told_count_);
+  std::memcpy(log_.data(), bytes.data() + sizeof(Saved), told_count_ * sizeof(Logged));
+  go_back(base_);
+  for (std::size_t n = 0; clock_.at < now_ || log_.size() < passed_; ++n) {
+    if (n == kMostPieces) return false;
+    extend(LegTimer::kNever);
+  }
+  return true;
+}
+
+}  // namespace drivebench

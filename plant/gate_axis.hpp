@@ -1,0 +1,147 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "plant/axis.hpp"
+#include "plant/drive/leg_timer.hpp"
+#include "plant/train/gate_tap.hpp"
+
+namespace drivebench {
+
+/// An event with its time.
+struct GateEdge {
+  Picoseconds at;
+  EventKind kind;
+  std::uint32_t channel;  ///< 0 for terminal a or line 1
+  std::uint32_t level;    ///< 0 or 1, after it
+};
+
+/// An axis on a switched inverter at gate level: the legs are set at any instant, their timers play PWM and
+/// dead time, and time goes on to any instant.
+///
+/// A piece ends at a change of a leg, at an event of the plant and on the grid of the steps of the tick,
+/// never because a client asks: it is integrated to its end at once, and what happens in it is told as time
+/// passes. set_leg() within it takes it back and integrates it up to that instant. So nothing depends on how
+/// a client divides its run. The grid, the tick and the noise are those of the bench; parameters, load and
+/// temperature are those of the tick.
+class GateAxis {
+ public:
+  /// The parameters must be free of problems() and have a switched inverter.
+  GateAxis(const AxisParameters& p, std::int64_t period_ns, int substeps, std::uint64_t seed,
+           std::uint64_t index);
+  GateAxis(const GateAxis&) = delete;
+  GateAxis& operator=(const GateAxis&) = delete;
+  ~GateAxis() = default;
+
+  Picoseconds now() const noexcept { return now_; }
+  int legs() const noexcept { return terminal_count(axis_.connection()); }
+  const AxisParameters& parameters() const noexcept { return axis_.parameters(); }
+
+  /// From now on. The setting has a period above 0 if its mode is one of PWM, and compare within it.
+  void set_leg(std::size_t leg, const LegSetting& setting);
+  /// From the next step on, at once.
+  void set_load(double load_nm);
+  /// From the next tick on.
+  void inject(std::size_t row, double value);
+  void clear_faults();
+
+  /// Runs to `until`, not before now, and writes what happens up to there. It ends early at the event that
+  /// fills `edges`; an empty one asks for none. The number of events written. An event that a change at
+  /// `until` itself brings, such as a jump beyond a threshold, belongs to the next run.
+  std::size_t run(Picoseconds until, std::span<GateEdge> edges);
+  /// The first event up to `limit` if no leg is set before; changes nothing.
+  std::optional<GateEdge> next_edge(Picoseconds limit);
+
+  /// At this instant, before what is set at it acts.
+  struct Now {
+    AxisState state{};
+    GateTruth truth{};
+    GateSums sums{};
+    LegLevels levels{};
+  };
+  Now look();
+  bool diverged() const noexcept { return (axis_.state().faults & kDiverged) != 0; }
+  /// Events that a piece had beyond the room for them.
+  std::uint64_t lost_events() const noexcept { return tap_.events.lost(); }
+
+  /// The whole state. restore() takes only bytes of save() of an axis of the same parameters; false for
+  /// others.
+  std::vector<std::byte> save() const;
+  bool restore(std::span<const std::byte> bytes);
+
+ private:
+  /// What goes on with time beside the axis. 8-byte members only.
+  struct Clock {
+    Picoseconds at = 0;
+    std::int64_t tick_open = 0;   ///< 1: within a tick
+    std::int64_t hall_count = 0;  ///< sectors of 60 electrical degrees
+    std::array<LegTimer, 3> legs{};
+  };
+  /// All that goes on with time.
+  struct Moment {
+    Clock clock{};
+    GateSums sums{};
+    AxisState axis{};
+  };
+  /// What has been told of the comparators and Hall lines: a piece that is cut goes on from there, because
+  /// its last digits are those of a shorter integration.
+  struct Told {
+    std::uint64_t levels = 0;
+    std::array<std::uint64_t, 3> edges{};
+    std::int64_t hall_count = 0;
+  };
+  struct Logged {
+    GateEdge edge{};
+    std::int64_t hall_count = 0;  ///< of a Hall edge, after it
+  };
+  /// What save() writes; behind it the events that have been told and not been handed out.
+  struct Saved {
+    Moment base{};
+    Picoseconds now = 0;
+    Told told{};
+    std::uint64_t passed = 0;
+    std::uint64_t told_count = 0;
+  };
+
+  /// Where the axis is; into place, because a copy has 6 kB.
+  void keep(Moment& moment) const;
+  void go_back(const Moment& moment);
+  void go_back(const AxisState& state);
+  /// Runs one piece, which ends at `limit` at the latest.
+  void extend(Picoseconds limit);
+  void log_events(Picoseconds from);
+  void log_hall(Picoseconds from);
+  void log_one(const Logged& event, std::size_t first);
+  void tell(const Logged& event) noexcept;
+  /// From base to now; what happens on the way is known.
+  void run_to_now();
+  Now seen() const;
+  /// Lets a piece end now.
+  void stop_here();
+  Tick tick() const noexcept { return clock_.at / period_; }
+  Picoseconds grid_after(Picoseconds at) const noexcept;
+  double within_tick_s(Picoseconds at) const noexcept;
+  Picoseconds at_of(double within_tick_s, Picoseconds from) const noexcept;
+
+  Axis axis_;
+  GateTap tap_;
+  Encoder hall_;  ///< whose counts are sectors
+  double pole_pairs_;
+  Picoseconds period_;
+  int substeps_;
+
+  Clock clock_{};  ///< where the axis is: at the end of a piece, not before now_
+  Moment base_{};  ///< where that piece, or the first one that next_edge() has looked at, began
+  Picoseconds now_ = 0;
+  std::vector<Logged> log_{};   ///< what happens from base_ on
+  std::size_t passed_ = 0;      ///< of them, which have been handed out
+  std::size_t told_count_ = 0;  ///< of them, which told_ has already
+  Told told_{};
+};
+
+}  // namespace drivebench

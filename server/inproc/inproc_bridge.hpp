@@ -1,0 +1,66 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "plant/gate_axis.hpp"
+#include "protocols/abi/bridge.hpp"
+#include "server/config/config.hpp"
+
+namespace drivebench {
+
+/// An axis of a bench at gate level, behind the C ABI.
+class InprocBridge final : public abi::Bridge {
+ public:
+  /// Why this axis has no bridge: a code and a sentence; DRIVEBENCH_OK if it has one.
+  struct Problem {
+    int code;
+    std::string sentence;
+  };
+  static Problem problem_with(const BenchConfig& config, std::uint32_t axis);
+
+  /// Without a problem.
+  InprocBridge(const BenchConfig& config, std::uint32_t axis);
+
+  int set(std::uint32_t leg, const drivebench_leg& setting) noexcept override;
+  int run(std::uint64_t until_ps, std::span<drivebench_bridge_edge> edges,
+          std::size_t& count) noexcept override;
+  std::uint64_t now_ps() const noexcept override { return static_cast<std::uint64_t>(axis_.now()); }
+  int next_edge(std::uint64_t limit_ps, drivebench_bridge_edge& edge, bool& found) noexcept override;
+  int read(drivebench_bridge_state& state) noexcept override;
+  int mark() noexcept override;
+  int mean(drivebench_bridge_means& means) noexcept override;
+  int set_load(double load_nm) noexcept override;
+  int inject(const char* name, double value) noexcept override;
+  int clear() noexcept override;
+  int save(std::vector<std::byte>& state) noexcept override;
+  int restore(std::span<const std::byte> state) noexcept override;
+
+ private:
+  /// What mean() counts from.
+  struct Mark {
+    Picoseconds at = 0;
+    double angle_rad = 0.0;
+    GateSums sums{};
+  };
+  /// In front of the state of the axis in what save() gives.
+  struct Header {
+    std::uint64_t magic;
+    std::uint64_t configuration;
+    std::uint64_t digest;  ///< of all that follows
+    Mark mark;
+  };
+
+  /// A time that is to come.
+  int check_time(const char* name, std::uint64_t at_ps) noexcept;
+  int check_finite() noexcept;
+  Mark mark_of_now() noexcept;
+
+  GateAxis axis_;
+  std::uint64_t configuration_;
+  Mark mark_{};
+};
+
+}  // namespace drivebench

@@ -1,0 +1,236 @@
+// The gate level behind the C ABI.
+#include <drivebench_bridge.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <limits>
+#include <string>
+#include <vector>
+
+namespace drivebench::client {
+namespace {
+
+constexpr std::uint64_t kMicro = 1'000'000;
+constexpr std::uint64_t kPeriod = 20 * kMicro;
+const std::string kEsc = "inproc:" DRIVEBENCH_CONFIGS "/benches/esc.toml";
+const std::string kBoard = "inproc:" DRIVEBENCH_CONFIGS "/benches/esc-board.toml";
+
+/// The setting of a leg.
+drivebench_leg leg_at(std::uint32_t mode, std::uint64_t period_ps = 0, std::uint64_t compare_ps = 0,
+                      std::uint64_t dead_ps = 0, std::uint32_t centred = 0) {
+  return {.mode = mode,
+          .centred = centred,
+          .period_start_ps = 0,
+          .period_ps = period_ps,
+          .compare_ps = compare_ps,
+          .dead_ps = dead_ps};
+}
+
+struct Bridge {
+  drivebench_bridge* handle = nullptr;
+
+  explicit Bridge(const std::string& address = kEsc) {
+    EXPECT_EQ(drivebench_bridge_open(address.c_str(), 0, &handle), DRIVEBENCH_OK)
+        << drivebench_bridge_error(nullptr);
+  }
+  Bridge(const Bridge&) = delete;
+  Bridge& operator=(const Bridge&) = delete;
+  ~Bridge() { drivebench_bridge_close(handle); }
+
+  std::string error() const { return drivebench_bridge_error(handle); }
+  int set(std::uint32_t leg, const drivebench_leg& setting) {
+    return drivebench_bridge_set(handle, leg, &setting);
+  }
+  int run(std::uint64_t until_ps) {
+    return drivebench_bridge_run(handle, until_ps, nullptr, 0, nullptr, nullptr);
+  }
+  drivebench_bridge_state read() {
+    drivebench_bridge_state state;
+    EXPECT_EQ(drivebench_bridge_read(handle, &state), DRIVEBENCH_OK);
+    return state;
+  }
+  std::vector<std::byte> save() {
+    std::size_t size = 0;
+    EXPECT_EQ(drivebench_bridge_save(handle, nullptr, &size), DRIVEBENCH_OK);
+    std::vector<std::byte> state(size);
+    EXPECT_EQ(drivebench_bridge_save(handle, state.data(), &size), DRIVEBENCH_OK);
+    return state;
+  }
+  /// The rotor is pulled along b.
+  void align(double duty = 0.1) {
+    set(0, leg_at(DRIVEBENCH_LEG_LOW));
+    set(1, leg_at(DRIVEBENCH_LEG_PWM, kPeriod,
+                  static_cast<std::uint64_t>(duty * static_cast<double>(kPeriod)), 200'000));
+    set(2, leg_at(DRIVEBENCH_LEG_OPEN));
+  }
+};
+
+// Catches: bad input that is taken, ends the program or is refused without a word; a refusal that changes the
+// state.
+TEST(Bridge, RefusesWhatCannotBe) {
+  Bridge bridge;
+  bridge.align();
+  ASSERT_EQ(bridge.run(777 * kMicro), DRIVEBENCH_OK);
+  const std::vector<std::byte> before = bridge.save();
+
+  const auto refuses = [&](int code, int expected, const std::string& sentence) {
+    EXPECT_EQ(code, expected) << sentence;
+    EXPECT_EQ(bridge.error(), sentence);
+  };
+  refuses(bridge.run(776 * kMicro), DRIVEBENCH_OUT_OF_RANGE,
+          "until_ps is 776000000 but time is at 777000000 already and does not go back");
+  refuses(bridge.run(std::numeric_limits<std::uint64_t>::max()), DRIVEBENCH_OUT_OF_RANGE,
+          "until_ps is 18446744073709551615 but must be at most 9000000000000000000");
+  drivebench_bridge_edge edge;
+  std::int32_t found = 7;
+  refuses(drivebench_bridge_next_edge(bridge.handle, 1, &edge, &found), DRIVEBENCH_OUT_OF_RANGE,
+          "limit_ps is 1 but time is at 777000000 already and does not go back");
+  EXPECT_EQ(found, 0);
+  refuses(bridge.set(3, leg_at(DRIVEBENCH_LEG_OPEN)), DRIVEBENCH_OUT_OF_RANGE,
+          "leg is 3 but the machine has legs 0 to 2");
+  refuses(bridge.set(1, leg_at(6)), DRIVEBENCH_OUT_OF_RANGE, "leg 1: mode is 6 but must be 0 to 5");
+  refuses(bridge.set(1, leg_at(DRIVEBENCH_LEG_PWM, 0, 0, 0, 2)), DRIVEBENCH_OUT_OF_RANGE,
+          "leg 1: centred is 2 but must be 0 or 1");
+  refuses(bridge.set(1, leg_at(DRIVEBENCH_LEG_PWM, 99'999)), DRIVEBENCH_OUT_OF_RANGE,
+          "leg 1: period_ps is 99999 but must be 100000 to 1000000000000 (100 ns to 1 s)");
+  refuses(bridge.set(1, leg_at(DRIVEBENCH_LEG_PWM, kPeriod, kPeriod + 1)), DRIVEBENCH_OUT_OF_RANGE,
+          "leg 1: compare_ps is 20000001 but must be within the period, 0 to 20000000");
+  refuses(bridge.set(0, leg_at(DRIVEBENCH_LEG_LOW, 0, 0, 1'000'000'001)), DRIVEBENCH_OUT_OF_RANGE,
+          "leg 0: dead_ps is 1000000001 but must be at most 1000000000 (1 ms)");
+  refuses(drivebench_bridge_set(bridge.handle, 0, nullptr), DRIVEBENCH_BAD_ARGUMENT,
+          "setting is a null pointer");
+  std::size_t count = 0;
+  refuses(drivebench_bridge_run(bridge.handle, 800 * kMicro, nullptr, 4, &count, nullptr),
+          DRIVEBENCH_BAD_ARGUMENT, "edges is a null pointer");
+  EXPECT_EQ(drivebench_bridge_set_load(bridge.handle, std::nan("")), DRIVEBENCH_NOT_FINITE);
+  EXPECT_EQ(drivebench_bridge_inject(bridge.handle, "open_phse", 1.0), DRIVEBENCH_UNKNOWN_FAULT);
+  EXPECT_NE(bridge.error().find("open_phase"), std::string::npos);
+  refuses(drivebench_bridge_restore(bridge.handle, before.data(), 100), DRIVEBENCH_MALFORMED,
+          "state is shorter than a state of a bridge");
+  for (const std::size_t place : {0UL, 8UL, 500UL, before.size() - 1}) {
+    std::vector<std::byte> damaged = before;
+    damaged[place] ^= std::byte{1};
+    EXPECT_EQ(drivebench_bridge_restore(bridge.handle, damaged.data(), damaged.size()), DRIVEBENCH_MALFORMED)
+        << place;
+  }
+  EXPECT_EQ(bridge.save(), before);
+  EXPECT_EQ(drivebench_bridge_run(nullptr, 0, nullptr, 0, nullptr, nullptr), DRIVEBENCH_BAD_ARGUMENT);
+}
+
+// Catches: a bench without gates, another library or a link that is taken for one with gates in process.
+TEST(Bridge, OpensOnlyWhatHasGates) {
+  drivebench_bridge* bridge = nullptr;
+  EXPECT_EQ(drivebench_bridge_open("tcp:localhost:7300", 0, &bridge), DRIVEBENCH_NOT_AVAILABLE);
+  EXPECT_STREQ(drivebench_bridge_error(nullptr),
+               "the gate level works in process only: the address must be inproc:BENCH, not "
+               "tcp:localhost:7300");
+  EXPECT_EQ(drivebench_bridge_open("inproc:" DRIVEBENCH_CONFIGS "/benches/servo.toml", 0, &bridge),
+            DRIVEBENCH_WRONG_DRIVE);
+  EXPECT_EQ(drivebench_bridge_open(kEsc.c_str(), 1, &bridge), DRIVEBENCH_UNKNOWN_AXIS);
+  EXPECT_EQ(drivebench_bridge_open("inproc:no-such-bench", 0, &bridge), DRIVEBENCH_NO_BENCH);
+  EXPECT_EQ(drivebench_bridge_open_abi(kEsc.c_str(), 0, DRIVEBENCH_ABI + 1, sizeof(drivebench_bridge_state),
+                                       sizeof(drivebench_bridge_means), &bridge),
+            DRIVEBENCH_OTHER_ABI);
+  EXPECT_EQ(bridge, nullptr);
+}
+
+// Catches: a run that goes beyond the edge that fills its room, a look ahead that differs from what comes or
+// that moves time.
+TEST(Bridge, GoesToTheNextEvent) {
+  Bridge bridge;
+  bridge.align();
+  std::uint64_t now_ps = 0;
+  int edges = 0;
+  while (now_ps < 5000 * kMicro) {
+    drivebench_bridge_edge next{};
+    std::int32_t found = 0;
+    ASSERT_EQ(drivebench_bridge_next_edge(bridge.handle, 5000 * kMicro, &next, &found), DRIVEBENCH_OK);
+    EXPECT_EQ(bridge.read().now_ps, now_ps);
+    drivebench_bridge_edge edge{};
+    std::size_t count = 0;
+    ASSERT_EQ(drivebench_bridge_run(bridge.handle, 5000 * kMicro, &edge, 1, &count, &now_ps), DRIVEBENCH_OK);
+    ASSERT_EQ(static_cast<std::size_t>(found), count);
+    if (count == 0) break;
+    ++edges;
+    EXPECT_EQ(edge.at_ps, next.at_ps);
+    EXPECT_EQ(edge.kind, next.kind);
+    EXPECT_EQ(now_ps, edge.at_ps);
+  }
+  EXPECT_GT(edges, 20);
+  EXPECT_EQ(now_ps, 5000 * kMicro);
+}
+
+// Catches: a mean of another interval than that since the mark, an energy that does not belong to it.
+TEST(Bridge, MeansCountFromTheMark) {
+  Bridge bridge;
+  bridge.align(0.25);
+  ASSERT_EQ(bridge.run(300'000 * kMicro + 7), DRIVEBENCH_OK);
+  ASSERT_EQ(drivebench_bridge_mark(bridge.handle), DRIVEBENCH_OK);
+  drivebench_bridge_means means;
+  ASSERT_EQ(drivebench_bridge_mean(bridge.handle, &means), DRIVEBENCH_OK);
+  EXPECT_EQ(means.time_s, 0.0);
+  EXPECT_EQ(means.current_a[1], 0.0);
+  ASSERT_EQ(bridge.run(300'000 * kMicro + 7 + 50 * kPeriod), DRIVEBENCH_OK);
+  ASSERT_EQ(drivebench_bridge_mean(bridge.handle, &means), DRIVEBENCH_OK);
+  EXPECT_EQ(means.since_ps, 300'000 * kMicro + 7);
+  EXPECT_DOUBLE_EQ(means.time_s, 1e-3);
+  EXPECT_NEAR(means.current_a[0] + means.current_a[1] + means.current_a[2], 0.0, 1e-9);
+  // the battery: 14.8 V behind 30 mohm, its capacitor as full at the start of the 50 periods as at their
+  // end; a step of at most 6.7 us has the link as it was at its start, which falls by up to 0.15 V in 4.8 us
+  EXPECT_NEAR(means.bus_v, 14.8 - 0.03 * means.link_a, 5e-3);
+  // the lower diode carries the current in the dead time: the leg is high for 5 us less 0.2 us of 20 us,
+  // while the link is up to 0.1 V above its mean
+  EXPECT_NEAR(means.terminal_v[1], means.bus_v * 4.8 / 20.0, 0.1 * 4.8 / 20.0);
+  EXPECT_NEAR(means.link_j, means.electrical_j, 1e-9 * means.link_j);  // ideal switches
+  EXPECT_NEAR(means.link_a * means.bus_v * means.time_s, means.link_j, 0.1 / 14.6 * means.link_j);
+}
+
+// The fault line is pulled at the start of a tick of 20 us, and the break input takes 150 ns. Catches: an
+// event without its time, legs that close by themselves, a clear that does nothing.
+TEST(Bridge, TheBreakInputOpensTheLegsUntilItIsCleared) {
+  Bridge bridge(kBoard);
+  bridge.set(0, leg_at(DRIVEBENCH_LEG_HIGH));
+  bridge.set(1, leg_at(DRIVEBENCH_LEG_LOW));
+  ASSERT_EQ(bridge.run(30 * kMicro), DRIVEBENCH_OK);
+  ASSERT_EQ(drivebench_bridge_inject(bridge.handle, "gate_driver_fault", 1.0), DRIVEBENCH_OK);
+  std::vector<drivebench_bridge_edge> edges(4096);
+  std::size_t count = 0;
+  ASSERT_EQ(drivebench_bridge_run(bridge.handle, 2000 * kMicro, edges.data(), edges.size(), &count, nullptr),
+            DRIVEBENCH_OK);
+  edges.resize(count);
+  std::vector<std::uint64_t> breaks_ps;
+  for (const drivebench_bridge_edge& edge : edges) {
+    if (edge.kind == DRIVEBENCH_EDGE_BREAK) breaks_ps.push_back(edge.at_ps);
+  }
+  EXPECT_EQ(breaks_ps, std::vector<std::uint64_t>{40'150'000});
+  EXPECT_EQ(bridge.read().current_a[0], 0.0);
+  ASSERT_EQ(drivebench_bridge_inject(bridge.handle, "gate_driver_fault", 0.0), DRIVEBENCH_OK);
+  ASSERT_EQ(bridge.run(2500 * kMicro), DRIVEBENCH_OK);
+  EXPECT_EQ(bridge.read().current_a[0], 0.0);
+  ASSERT_EQ(drivebench_bridge_clear(bridge.handle), DRIVEBENCH_OK);
+  ASSERT_EQ(bridge.run(2550 * kMicro), DRIVEBENCH_OK);
+  EXPECT_GT(bridge.read().current_a[0], 1.0);
+}
+
+// Catches: a state that another bridge of the same bench does not take, or goes on from otherwise.
+TEST(Bridge, AStateGoesOnInAnotherBridge) {
+  Bridge first;
+  first.align(0.3);
+  ASSERT_EQ(first.run(12'345'678'901), DRIVEBENCH_OK);
+  const std::vector<std::byte> state = first.save();
+  Bridge second;
+  ASSERT_EQ(drivebench_bridge_restore(second.handle, state.data(), state.size()), DRIVEBENCH_OK)
+      << second.error();
+  for (Bridge* bridge : {&first, &second})
+    ASSERT_EQ(bridge->run(30'000'000'000), DRIVEBENCH_OK);
+  EXPECT_EQ(first.save(), second.save());
+  Bridge board(kBoard);
+  EXPECT_EQ(drivebench_bridge_restore(board.handle, state.data(), state.size()), DRIVEBENCH_MALFORMED);
+  EXPECT_EQ(board.error(), "state is of another bench file or axis");
+}
+
+}  // namespace
+}  // namespace drivebench::client
