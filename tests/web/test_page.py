@@ -146,7 +146,7 @@ class Page(PageTest):
         shown = self.play("train", self.gateway(self.on_the_line()).url)
         self.assertEqual(shown["titles"], ["source", "induction", "load"])
         self.assertGreater(shown["angles"], 5)
-        self.assertRegex(shown["note"], r"^drawn \d+ times slower$")
+        self.assertRegex(shown["note"], r"^drawn \d+(\.\d)? times slower$")
         self.assertEqual(shown["values"]["voltage"], "u 169.8 V")  # the line has 169.83 V
         for name, unit in (("current", "A"), ("torque", "N\\*m"), ("load", "N\\*m"), ("speed", "rad/s")):
             self.assertRegex(shown["values"][name], rf"^(i )?-?[\d.]+ [nmµk]?{unit}$")

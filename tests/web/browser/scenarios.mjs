@@ -47,6 +47,12 @@ async function set(page, label, value, within = page) {
 const press = (page, words) => page.evaluate((wanted) =>
   [...document.querySelectorAll("button")].find((each) => (each.ariaLabel ?? each.textContent) === wanted).click(), words);
 
+/** The panes of the scope, as soon as there are any. */
+async function panesOf(page) {
+  await page.waitForSelector(".pane", { timeout: kPatienceMs });
+  return page.$$(".pane");
+}
+
 /** Sets the kind of a pane. */
 const kind = (pane, value) => pane.$eval('[aria-label="kind of this pane"]', (field, wanted) => {
   field.value = wanted;
@@ -190,7 +196,7 @@ const scenarios = {
   async kinds(page) {
     await stateOf(page, "speed", /^[1-9]/);
     await set(page, "window", "0.5");
-    const [, currents, voltages] = await page.$$(".pane");
+    const [, currents, voltages] = await panesOf(page);
     const chips = () => currents.$$eval(".chip", (all) => all.map((each) => each.textContent));
     await kind(currents, "xy");
     const [size, ofXy] = [await currents.$eval("canvas", (canvas) => canvas.clientHeight), await chips()];
@@ -228,7 +234,7 @@ const scenarios = {
     const armed = await armOnFault(page);
     const answer = await injectForATick(page);
     const state = await text(page, '[aria-label="trigger state"]', /triggered/);
-    await add((await page.$$(".pane"))[0], "0:injected");
+    await add((await panesOf(page))[0], "0:injected");
     const row = await until(async () => JSON.stringify(await measured(page, "injected") ?? {}), /"maximum":"[1-9]/);
     const file = await catchFiles(page);
     await press(page, "CSV");
@@ -240,7 +246,7 @@ const scenarios = {
 
   /** The same while the page hears nothing for so long that it loses samples. */
   async slowTrigger(page) {
-    await add((await page.$$(".pane"))[0], "0:injected");
+    await add((await panesOf(page))[0], "0:injected");
     await armOnFault(page);
     await injectForATick(page);
     await page.evaluate(() => {
@@ -304,7 +310,7 @@ const scenarios = {
     await set(page, "trigger sweep", "single");
     await set(page, "part of the window before the trigger, percent", "50");
     await text(page, '[aria-label="trigger state"]', /armed/);
-    const [pane] = await page.$$(".pane");
+    const [pane] = await panesOf(page);
     await add(pane, "0:state");
     await set(page, "boost: amplitude at standstill, V (servo)", "40"); // far more than the amplifier's 6 A
     await press(page, "drive servo");
@@ -397,7 +403,7 @@ const scenarios = {
   /** Every kind of pane, for axe-core. */
   async axe(page) {
     await stateOf(page, "tick", /[1-9]/);
-    const [, locus, spectrum] = await page.$$(".pane");
+    const [, locus, spectrum] = await panesOf(page);
     await kind(locus, "xy");
     await kind(spectrum, "spectrum");
     return axeFinds(page);
@@ -412,7 +418,7 @@ const scenarios = {
     await stateOf(page, "speed", /^[1-9]/);
     const openS = (Date.now() - opened) / 1000;
     await set(page, "window", windowS);
-    const [first] = await page.$$(".pane");
+    const [first] = await panesOf(page);
     await add(first, "0:torque_nm");
     await page.evaluate(() => {
       window.drawn = 0;
@@ -452,10 +458,10 @@ const scenarios = {
     await page.emulateMediaFeatures([{ name: "prefers-color-scheme", value: theme }]);
     await stateOf(page, "speed", /^[1-9]/);
     await set(page, "window", "0.2");
-    const [, , voltages] = await page.$$(".pane");
+    const [, , voltages] = await panesOf(page);
     await kind(voltages, "spectrum");
     await press(page, "Add pane");
-    const locus = (await page.$$(".pane"))[3];
+    const locus = (await panesOf(page))[3];
     await kind(locus, "xy");
     for (const signal of ["0:i_a_a", "0:i_b_a"]) await add(locus, signal);
     await until(async () => JSON.stringify(await measured(page, "speed_rad_s") ?? {}), /"maximum":"[1-9]/);
