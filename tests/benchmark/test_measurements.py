@@ -1,5 +1,6 @@
 """Every measurement of drivebench-benchmark once, as briefly as it goes: they work; their figures say nothing here."""
 import json
+import math
 import pathlib
 import subprocess
 import sys
@@ -28,7 +29,8 @@ class Measurements(unittest.TestCase):
         self.assertGreater(len(rows), 2 * len(listed))
         for row in rows:
             if row["verdict"] != "skipped":
-                self.assertGreaterEqual(row["measured"], 0.0, row)
+                # A difference of two times can be below zero beside other work.
+                self.assertTrue(math.isfinite(row["measured"]), row)
         with tempfile.TemporaryDirectory() as folder:
             file = pathlib.Path(folder) / "run.json"
             file.write_text(done.stdout, encoding="utf-8")
