@@ -32,11 +32,17 @@ bool is_absurd(const Dimension& dimension) noexcept {
   return std::ranges::any_of(dimension.exponents, [](int each) { return std::abs(each) > 1000; });
 }
 
+/// Infinite or no number where the divisor is zero (IEEE 754), which a check then tells.
+__attribute__((no_sanitize("float-divide-by-zero"))) double quotient_of(double dividend,
+                                                                        double divisor) noexcept {
+  return dividend / divisor;
+}
+
 double power_of(double base, int exponent) noexcept {
   double product = 1.0;
   for (int i = 0; i < std::abs(exponent); ++i)
     product *= base;
-  return exponent < 0 ? 1.0 / product : product;
+  return exponent < 0 ? quotient_of(1.0, product) : product;
 }
 
 /// What is no number stays none, so that a check of it fails.
@@ -311,7 +317,7 @@ double Formula::value(std::span<const Sample> samples, std::size_t axis,
     if (step.code == Code::kAdd) left += right;
     if (step.code == Code::kSubtract) left -= right;
     if (step.code == Code::kMultiply) left *= right;
-    if (step.code == Code::kDivide) left /= right;
+    if (step.code == Code::kDivide) left = quotient_of(left, right);
     if (step.code == Code::kMin) left = std::isnan(right) ? right : std::min(left, right);
     if (step.code == Code::kMax) left = std::isnan(right) ? right : std::max(left, right);
   }
