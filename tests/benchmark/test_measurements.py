@@ -29,8 +29,9 @@ class Measurements(unittest.TestCase):
         self.assertGreater(len(rows), 2 * len(listed))
         for row in rows:
             if row["verdict"] != "skipped":
-                # A difference of two times can be below zero beside other work.
-                self.assertTrue(math.isfinite(row["measured"]), row)
+                # A case beside its ticks is the difference of two times: beside other work it can be below zero.
+                least = -math.inf if row["name"].endswith("beside its ticks") else 0.0
+                self.assertGreaterEqual(row["measured"], least, row)
         with tempfile.TemporaryDirectory() as folder:
             file = pathlib.Path(folder) / "run.json"
             file.write_text(done.stdout, encoding="utf-8")

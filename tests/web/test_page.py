@@ -111,6 +111,17 @@ class PageTest(unittest.TestCase):
         self.assertEqual(shown.pop("complaints"), [], "the browser complains: scripts, or what the policy forbids")
         return shown
 
+    def assert_identified(self, shown, expected):
+        """The page shows the table of an identification with its intervals, its verdict and its plot, and axe finds no serious fault."""
+        self.assertEqual([row[0] for row in shown["rows"]], sorted(expected))
+        for name, estimate, interval, unit, truth, inside in shown["rows"]:
+            self.assertEqual((unit, inside), (expected[name]["unit"], "yes"))
+            for text, value in ((estimate, "estimate"), (interval, "interval"), (truth, "truth")):
+                self.assertAlmostEqual(float(text), expected[name][value], delta=1e-3 * expected[name][value])
+        self.assertIn("the data see every parameter", shown["text"])
+        self.assertEqual(shown["plot"], 720)  # wide, and so it was loaded
+        self.assertEqual([each for each in shown["found"] if each["impact"] in ("serious", "critical")], [])
+
     def for_users(self, *options, bench="servo"):
         """A bench in lockstep that knows a viewer, an operator and a conductor."""
         return self.serve("--mode", "lockstep", *options, text=text_for_users(self.folder, bench))
@@ -146,7 +157,7 @@ class Page(PageTest):
         shown = self.play("train", self.gateway(self.on_the_line()).url)
         self.assertEqual(shown["titles"], ["source", "induction", "load"])
         self.assertGreater(shown["angles"], 5)
-        self.assertRegex(shown["note"], r"^drawn \d+(\.\d)? times slower$")
+        self.assertRegex(shown["note"], r"^drawn (\d\.\d|\d\d+) times slower$")
         self.assertEqual(shown["values"]["voltage"], "u 169.8 V")  # the line has 169.83 V
         for name, unit in (("current", "A"), ("torque", "N\\*m"), ("load", "N\\*m"), ("speed", "rad/s")):
             self.assertRegex(shown["values"][name], rf"^(i )?-?[\d.]+ [nmµk]?{unit}$")

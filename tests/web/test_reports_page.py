@@ -37,14 +37,7 @@ class ReportsPage(PageTest):
         shown = self.play("reports", self.gateway(self.serve("--mode", "lockstep"), "--reports", self.reports).url)
         self.assertEqual(sorted(shown["names"]), ["motor.json", "motor.svg", "suite.html"])
         expected = json.loads(report)["parameters"]
-        self.assertEqual([row[0] for row in shown["rows"]], sorted(expected))
-        for name, estimate, interval, unit, truth, inside in shown["rows"]:
-            self.assertEqual((unit, inside), (expected[name]["unit"], "yes"))
-            for text, value in ((estimate, "estimate"), (interval, "interval"), (truth, "truth")):
-                self.assertAlmostEqual(float(text), expected[name][value], delta=1e-3 * expected[name][value])
-        self.assertIn("the data see every parameter", shown["text"])
-        self.assertEqual(shown["plot"], 720)  # wide, and so it was loaded
-        self.assertEqual([each for each in shown["found"] if each["impact"] in ("serious", "critical")], [])
+        self.assert_identified(shown, expected)
         self.assertEqual((shown["title"], shown["cells"] >= 4, shown["font"]), ("suite", True, shown["font"]))
 
     def test_web_07_a_hostile_report_stays_in_its_box(self):

@@ -56,15 +56,8 @@ class RunsPage(PageTest):
         self.assertEqual((shown["running"], shown["cancelled"]), ("0 of 1", "cancelled"))
         self.assertEqual(shown["identification"][:5], ["3", "dc of experiment 1", "passed", "", "the data see every parameter"])
         expected = json.loads(self.drivebench("identify", "--motor", "dc", "--from", "steps.mcap", "--json", server=bench))["parameters"]
-        self.assertEqual({row[0] for row in shown["rows"]}, set(expected))
-        for name, estimate, interval, unit, truth, inside in shown["rows"]:
-            self.assertEqual((unit, inside), (expected[name]["unit"], "yes"))
-            for text, value in ((estimate, "estimate"), (interval, "interval"), (truth, "truth")):
-                self.assertAlmostEqual(float(text), expected[name][value], delta=1e-3 * expected[name][value])
-        self.assertIn("the data see every parameter", shown["text"])
-        self.assertEqual(shown["plot"], 720)  # wide, and so it was loaded
+        self.assert_identified(shown, expected)
         self.assertEqual(sorted(shown["names"]), sorted(each.name for each in self.reports.iterdir()))
-        self.assertEqual([each for each in shown["found"] if each["impact"] in ("serious", "critical")], [])
         self.assertEqual(shown["answer"], "run 3: passed: the data see every parameter")
         self.assertEqual(shown["reached"], ["suite to run", "Run the suite", "List of runs"])
 

@@ -12,6 +12,7 @@
 #include "tests/benchmark/harness/plan.hpp"
 #include "tests/benchmark/harness/statistics.hpp"
 #include "tests/benchmark/measurements.hpp"
+#include "tests/clients/sdk/leg_setting.hpp"
 
 namespace drivebench::speed {
 namespace {
@@ -23,17 +24,6 @@ constexpr int kPolePairs = 7;
 constexpr std::uint64_t kPwmPs = 20'833'333;  // 48 kHz
 constexpr std::uint64_t kAskPs = 500'000;     // 2 million times in a simulated second
 constexpr double kWantedRpm = 9000.0;
-
-/// The setting of a leg.
-drivebench_leg leg_at(std::uint32_t mode, std::uint64_t period_ps = 0, std::uint64_t compare_ps = 0,
-                      std::uint64_t dead_ps = 0, std::uint32_t centred = 0) {
-  return {.mode = mode,
-          .centred = centred,
-          .period_start_ps = 0,
-          .period_ps = period_ps,
-          .compare_ps = compare_ps,
-          .dead_ps = dead_ps};
-}
 
 void check(drivebench_bridge* bridge, int code) {
   if (code != DRIVEBENCH_OK) throw std::runtime_error(drivebench_bridge_error(bridge));

@@ -10,6 +10,8 @@
 #include <string>
 #include <vector>
 
+#include "tests/clients/sdk/leg_setting.hpp"
+
 namespace drivebench::client {
 namespace {
 
@@ -17,17 +19,6 @@ constexpr std::uint64_t kMicro = 1'000'000;
 constexpr std::uint64_t kPeriod = 20 * kMicro;
 const std::string kEsc = "inproc:" DRIVEBENCH_CONFIGS "/benches/esc.toml";
 const std::string kBoard = "inproc:" DRIVEBENCH_CONFIGS "/benches/esc-board.toml";
-
-/// The setting of a leg.
-drivebench_leg leg_at(std::uint32_t mode, std::uint64_t period_ps = 0, std::uint64_t compare_ps = 0,
-                      std::uint64_t dead_ps = 0, std::uint32_t centred = 0) {
-  return {.mode = mode,
-          .centred = centred,
-          .period_start_ps = 0,
-          .period_ps = period_ps,
-          .compare_ps = compare_ps,
-          .dead_ps = dead_ps};
-}
 
 struct Bridge {
   drivebench_bridge* handle = nullptr;

@@ -101,7 +101,7 @@ std::optional<std::string> verdict_of(std::string_view text) {
   return std::nullopt;
 }
 
-/// Moves the picture first: whoever finds the report finds its picture.
+/// Moves the picture before the report: a report that the page lists has its picture.
 void keep_identification(const WorkFolder& folder, const fs::path& picture, const std::string& report,
                          const fs::path& place) {
   const fs::path file = folder.file("report.json");
