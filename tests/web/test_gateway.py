@@ -5,6 +5,7 @@ import base64
 import json
 import pathlib
 import re
+import socket
 import subprocess
 import sys
 import unittest
@@ -244,6 +245,26 @@ class Abuse(GatewayTest):
                 except ConnectionError:
                     pass
         self.assertEqual(self.web.get("/health")[0], 200)
+
+
+class Going(GatewayTest):
+    def test_what_the_browser_sends_to_a_bench_that_goes_hides_no_last_words(self):
+        """Catches: a failed write that ends the session as if the browser had gone, before the bench's own end is read."""
+        path = self.folder / "going.sock"
+        with socket.socket(socket.AF_UNIX) as listening:
+            listening.bind(str(path))
+            listening.listen()
+            browser = self.gateway(link=f"unix:{path}").browser(hello=False)
+            self.addCleanup(browser.close)
+            bench, _ = listening.accept()
+            with bench:
+                last_words = frame(pb.Envelope(notice=pb.Notice(message="the bench goes")).SerializeToString())
+                bench.shutdown(socket.SHUT_RD)
+                bench.sendall(last_words)
+                browser.send_bytes(frame(b"\x08\x01"))
+                self.assertEqual(browser.receive().notice.message, "the bench goes")
+                self.assertTrue(browser.is_closed())
+        self.assertEqual((browser.close_code, browser.close_reason), (1001, "the bench has ended the session"))
 
 
 class Drive(GatewayTest):

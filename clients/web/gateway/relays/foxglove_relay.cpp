@@ -56,8 +56,8 @@ class FoxgloveRelay : public Relay, public std::enable_shared_from_this<Foxglove
       if (!cancelled) self->bench_.close(ignored);
     });
     error_code error;
-    co_await asio::async_write(bench_, asio::buffer(frame_of(hello)),
-                               asio::redirect_error(use_awaitable, error));
+    const std::string frame = frame_of(hello);
+    co_await write_to_bench(asio::buffer(frame), error);
     if (!error) co_await read(error);
     const std::optional<v1::Envelope> answer = next_envelope();
     if (answer && answer->has_welcome()) {
@@ -107,8 +107,9 @@ class FoxgloveRelay : public Relay, public std::enable_shared_from_this<Foxglove
       pause_.cancel();
       if (session_->is_full()) break;
       if (requests.empty()) continue;
-      context_.counts.bytes_to_bench += requests.size();
-      co_await asio::async_write(bench_, asio::buffer(requests), asio::redirect_error(use_awaitable, error));
+      error_code gone;
+      co_await write_to_bench(asio::buffer(requests), gone);
+      if (gone) co_return;  // from_bench() ends the session
     }
     if (error == websocket::error::message_too_big) ++context_.counts.refusals["size"];
     end(websocket::close_code::normal, session_->is_full() ? "the client reads too slowly" : "");

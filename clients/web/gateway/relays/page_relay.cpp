@@ -68,7 +68,9 @@ class PageRelay : public Relay, public std::enable_shared_from_this<PageRelay> {
         leave(websocket::close_code::protocol_error, problem);
         co_return;
       }
-      if (!is_order) co_await write(buffer.data(), error);
+      error_code gone;
+      if (!is_order) co_await write(buffer.data(), gone);
+      if (gone) co_return;
     }
     if (error == websocket::error::message_too_big) ++context_.counts.refusals["size"];
     leave(websocket::close_code::normal, "");
@@ -129,7 +131,7 @@ class PageRelay : public Relay, public std::enable_shared_from_this<PageRelay> {
                                .motor = wanted.motor});
   }
 
-  /// Writes whole, one coroutine after the other.
+  /// Writes whole, one coroutine after the other. After an error from_bench() ends the session.
   asio::awaitable<void> write(asio::const_buffer bytes, error_code& error) {
     while (is_writing_) {
       error_code cancelled;
@@ -137,8 +139,7 @@ class PageRelay : public Relay, public std::enable_shared_from_this<PageRelay> {
       co_await turnstile_.async_wait(asio::redirect_error(use_awaitable, cancelled));
     }
     is_writing_ = true;
-    context_.counts.bytes_to_bench += bytes.size();
-    co_await asio::async_write(bench_, bytes, asio::redirect_error(use_awaitable, error));
+    co_await write_to_bench(bytes, error);
     is_writing_ = false;
     turnstile_.cancel();
   }

@@ -54,6 +54,13 @@ asio::awaitable<bool> Relay::connect() {
   co_return false;
 }
 
+asio::awaitable<void> Relay::write_to_bench(asio::const_buffer bytes, error_code& error) {
+  context_.counts.bytes_to_bench += bytes.size();
+  co_await asio::async_write(bench_, bytes, asio::redirect_error(use_awaitable, error));
+  error_code ignored;
+  if (error) bench_.shutdown(asio::socket_base::shutdown_both, ignored);
+}
+
 void Relay::end(websocket::close_code code, std::string_view why) {
   if (reason_.code == websocket::close_code::none) {
     reason_ =

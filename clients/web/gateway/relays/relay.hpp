@@ -45,6 +45,8 @@ class Relay {
   asio::awaitable<void> accept(Request request, std::size_t max_message, std::string_view subprotocol);
   /// Connects to the bench on another thread, since that may wait.
   asio::awaitable<bool> connect();
+  /// A bench that takes no more has gone: after an error its last words are still read, and then the end.
+  asio::awaitable<void> write_to_bench(asio::const_buffer bytes, boost::system::error_code& error);
   /// Notes the reason for the client; the first one counts.
   void end(websocket::close_code code, std::string_view why);
   /// Waits until there may be something to send; false: the relay has ended.
