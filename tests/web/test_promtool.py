@@ -28,7 +28,6 @@ class Promtool(unittest.TestCase):
 
 if __name__ == "__main__":
     if not PAGE.exists() or shutil.which("promtool") is None:
-        # Not among the packages that ./bench installs: Debian's starts a service with it.
-        print(f"SKIPPED: needs promtool (Debian: apt install prometheus) and the page {PAGE}")
+        print(f"SKIPPED: needs promtool (Debian: apt install prometheus; ./bench test unpacks it) and the page {PAGE}")
         sys.exit(77)
     unittest.main(verbosity=2)
