@@ -122,7 +122,7 @@ std::span<const AxisSample> Link::exchange_in_memory(std::span<const AxisCommand
   keep_waiting_messages();  // a notice may say why
   if (outcome == SharedMemory::Outcome::kRefused) throw RefusalError(memory_->refusal());
   if (outcome == SharedMemory::Outcome::kTooLate) fail_late();
-  fail("closed the connection");
+  fail_ended(0);
 }
 
 /// Reads what has come over the socket meanwhile: the bench cuts off a session that does not.

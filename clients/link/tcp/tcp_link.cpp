@@ -259,7 +259,7 @@ void Link::send(const v1::Envelope& request) {
     } else if (errno == EAGAIN) {
       fail("took no request within " + seconds(deadline_));
     } else if (errno != EINTR) {
-      fail("closed the connection: " + std::generic_category().message(errno));
+      fail_ended(errno);
     }
   }
 }
@@ -311,14 +311,19 @@ void Link::receive_some() {
     const std::ptrdiff_t received = taken_ == nullptr ? ::recv(socket_.get(), space.data(), space.size(), 0)
                                                       : receive_with_descriptors(space);
     if (received > 0) return reader_.received(static_cast<std::size_t>(received));
-    if (received == 0) fail("closed the connection");
+    if (received == 0) fail_ended(0);
     if (errno == EAGAIN) fail_late();
-    if (errno != EINTR) fail("closed the connection: " + std::generic_category().message(errno));
+    if (errno != EINTR) fail_ended(errno);
   }
 }
 
 void Link::fail_late() {
   fail("gave no answer within " + seconds(deadline_));
+}
+
+void Link::fail_ended(int error) {
+  if (error == 0 || error == ECONNRESET || error == EPIPE) fail("closed the connection");
+  fail("closed the connection: " + std::generic_category().message(error));
 }
 
 void Link::fail(const std::string& what) {

@@ -2,8 +2,11 @@
 #include "clients/link/tcp/tcp_link.hpp"
 
 #include <gtest/gtest.h>
+#include <sys/socket.h>
 
 #include <array>
+#include <thread>
+#include <utility>
 #include <vector>
 
 #include "tests/clients/link/tcp/fake_peer.hpp"
@@ -281,6 +284,29 @@ TEST(Link, GivesUpWhenOnlySamplesCome) {
   EXPECT_EQ(message_of([&] { Link(FileDescriptor(ends[0]), "the bench", {.deadline = 20ms}); }),
             "the bench gave no answer within 20 ms");
   sender.join();
+}
+
+// Catches: words of a lost connection, and with them reports, that depend on how far the bytes had come.
+TEST(Link, AnEndAResetAndABrokenPipeAreToldAlike) {
+  enum class Leaves { kBefore, kWithUnread, kAfterReading };
+  for (const Leaves leaves : {Leaves::kBefore, Leaves::kWithUnread, Leaves::kAfterReading}) {
+    std::array<int, 2> ends{};
+    ASSERT_EQ(::socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, ends.data()), 0);
+    FileDescriptor ours(ends[0]);
+    FileDescriptor theirs(ends[1]);
+    if (leaves == Leaves::kBefore) theirs.close();
+    std::thread peer([&] {
+      if (leaves == Leaves::kBefore) return;
+      std::array<char, 64> byte{};
+      ::recv(theirs.get(), byte.data(), 1, leaves == Leaves::kWithUnread ? MSG_PEEK : 0);
+      if (leaves == Leaves::kAfterReading)
+        while (::recv(theirs.get(), byte.data(), byte.size(), MSG_DONTWAIT) > 0)
+          continue;
+      theirs.close();
+    });
+    EXPECT_EQ(message_of([&] { Link(std::move(ours), "it", {.deadline = 2s}); }), "it closed the connection");
+    peer.join();
+  }
 }
 
 // Catches: trust in what comes: another protocol, an oversized frame, another kind, another id, the end.
