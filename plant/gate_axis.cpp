@@ -100,11 +100,9 @@ void GateAxis::log_events(Picoseconds from) {
   const std::size_t first = log_.size();
   for (std::size_t n = 0; n < tap_.events.size(); ++n) {
     const PlantEvent& event = tap_.events[n];
-    log_one({.edge = {.at = at_of(event.at_s, from),
-                      .kind = event.kind,
-                      .channel = event.channel,
-                      .level = event.level}},
-            first);
+    const GateEdge edge{
+        .at = at_of(event.at_s, from), .kind = event.kind, .channel = event.channel, .level = event.level};
+    if (!in_cut(edge)) log_one({.edge = edge}, first);
   }
   if (axis_.parameters().sensors.hall.enabled) log_hall(from);
 }
@@ -150,6 +148,18 @@ void GateAxis::tell(const Logged& event) noexcept {
   ++told_.edges[event.edge.channel];
 }
 
+std::uint64_t GateAxis::bit_in_cut(const GateEdge& edge) noexcept {
+  if (edge.kind == EventKind::kCurrentZero) return std::uint64_t{1} << edge.channel;
+  return edge.kind == EventKind::kBreak ? 8 : 0;
+}
+
+void GateAxis::add_to_cut() noexcept {
+  if (cut_.at != now_) cut_ = {.at = now_};
+  for (const Logged& event : log_) {
+    if (event.edge.at == now_) cut_.told |= bit_in_cut(event.edge);
+  }
+}
+
 void GateAxis::run_to_now() {
   const std::size_t known = log_.size();
   go_back(base_);
@@ -167,6 +177,7 @@ void GateAxis::run_to_now() {
 }
 
 void GateAxis::stop_here() {
+  add_to_cut();
   const auto passed = log_.begin() + static_cast<std::ptrdiff_t>(passed_);
   auto later = passed;
   for (; later != log_.end() && later->edge.at <= now_; ++later) {
@@ -190,6 +201,13 @@ void GateAxis::set_leg(std::size_t leg, const LegSetting& setting) {
 void GateAxis::set_load(double load_nm) {
   stop_here();
   axis_.set_load(load_nm, tick(), 0);
+  keep(base_);
+}
+
+void GateAxis::set_parameters(const AxisParameters& p) {
+  stop_here();
+  axis_.set_parameters(with_terminals(p));
+  go_back(AxisState(axis_.state()));  // the tick that is running takes them
   keep(base_);
 }
 
@@ -255,7 +273,8 @@ GateAxis::Now GateAxis::seen() const {
 
 std::vector<std::byte> GateAxis::save() const {
   static_assert(std::is_trivially_copyable_v<Saved> && std::is_trivially_copyable_v<Logged>);
-  const Saved saved{.base = base_, .now = now_, .told = told_, .passed = passed_, .told_count = told_count_};
+  const Saved saved{
+      .base = base_, .now = now_, .told = told_, .cut = cut_, .passed = passed_, .told_count = told_count_};
   std::vector<std::byte> bytes(sizeof(Saved) + told_count_ * sizeof(Logged));
   std::memcpy(bytes.data(), &saved, sizeof(Saved));
   std::memcpy(bytes.data() + sizeof(Saved), log_.data(), told_count_ * sizeof(Logged));
@@ -271,6 +290,7 @@ bool GateAxis::restore(std::span<const std::byte> bytes) {
   base_ = saved.base;
   now_ = saved.now;
   told_ = saved.told;
+  cut_ = saved.cut;
   told_count_ = saved.told_count;
   passed_ = saved.passed;
   log_.resize(told_count_);

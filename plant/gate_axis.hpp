@@ -46,6 +46,8 @@ class GateAxis {
   void set_leg(std::size_t leg, const LegSetting& setting);
   /// From the next step on, at once.
   void set_load(double load_nm);
+  /// From now on. The parameters must be free of problems() and differ in live ones only.
+  void set_parameters(const AxisParameters& p);
   /// From the next tick on.
   void inject(std::size_t row, double value);
   void clear_faults();
@@ -69,8 +71,8 @@ class GateAxis {
   /// Events that a piece had beyond the room for them.
   std::uint64_t lost_events() const noexcept { return tap_.events.lost(); }
 
-  /// The whole state. restore() takes only bytes of save() of an axis of the same parameters; false for
-  /// others.
+  /// The whole state but the parameters. restore() takes only bytes of save() of an axis of the same
+  /// parameters; false for others.
   std::vector<std::byte> save() const;
   bool restore(std::span<const std::byte> bytes);
 
@@ -95,6 +97,12 @@ class GateAxis {
     std::array<std::uint64_t, 3> edges{};
     std::int64_t hall_count = 0;
   };
+  /// The currents that have died and the break that has opened the legs, told at the instant at which a leg
+  /// was set last: the state is cut within a picosecond of them, so that they may come once more.
+  struct Cut {
+    Picoseconds at = -2;
+    std::uint64_t told = 0;  ///< bits of bit_in_cut()
+  };
   struct Logged {
     GateEdge edge{};
     std::int64_t hall_count = 0;  ///< of a Hall edge, after it
@@ -104,6 +112,7 @@ class GateAxis {
     Moment base{};
     Picoseconds now = 0;
     Told told{};
+    Cut cut{};
     std::uint64_t passed = 0;
     std::uint64_t told_count = 0;
   };
@@ -118,6 +127,13 @@ class GateAxis {
   void log_hall(Picoseconds from);
   void log_one(const Logged& event, std::size_t first);
   void tell(const Logged& event) noexcept;
+  static std::uint64_t bit_in_cut(const GateEdge& edge) noexcept;
+  /// Takes what has happened now into the cut.
+  void add_to_cut() noexcept;
+  /// Whether the cut has told it already.
+  bool in_cut(const GateEdge& edge) const noexcept {
+    return edge.at <= cut_.at + 1 && (cut_.told & bit_in_cut(edge)) != 0;
+  }
   /// From base to now; what happens on the way is known.
   void run_to_now();
   Now seen() const;
@@ -142,6 +158,7 @@ class GateAxis {
   std::size_t passed_ = 0;      ///< of them, which have been handed out
   std::size_t told_count_ = 0;  ///< of them, which told_ has already
   Told told_{};
+  Cut cut_{};
 };
 
 }  // namespace drivebench

@@ -147,6 +147,19 @@ int drivebench_bridge_set_load(drivebench_bridge* bridge, double load_nm) {
   return b == nullptr ? DRIVEBENCH_BAD_ARGUMENT : b->set_load(load_nm);
 }
 
+int drivebench_bridge_get_parameter(drivebench_bridge* bridge, const char* name, double* value) {
+  Bridge* const b = ready(bridge);
+  if (b == nullptr) return DRIVEBENCH_BAD_ARGUMENT;
+  if (name == nullptr) return null_argument(*b, "name");
+  return value == nullptr ? null_argument(*b, "value") : b->get_parameter(name, *value);
+}
+
+int drivebench_bridge_set_parameter(drivebench_bridge* bridge, const char* name, double value) {
+  Bridge* const b = ready(bridge);
+  if (b == nullptr) return DRIVEBENCH_BAD_ARGUMENT;
+  return name == nullptr ? null_argument(*b, "name") : b->set_parameter(name, value);
+}
+
 int drivebench_bridge_inject(drivebench_bridge* bridge, const char* name, double value) {
   Bridge* const b = ready(bridge);
   if (b == nullptr) return DRIVEBENCH_BAD_ARGUMENT;

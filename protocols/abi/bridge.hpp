@@ -29,6 +29,8 @@ class Bridge {
   virtual int mark() noexcept = 0;
   virtual int mean(drivebench_bridge_means& means) noexcept = 0;
   virtual int set_load(double load_nm) noexcept = 0;
+  virtual int get_parameter(const char* name, double& value) noexcept = 0;
+  virtual int set_parameter(const char* name, double value) noexcept = 0;
   virtual int inject(const char* name, double value) noexcept = 0;
   virtual int clear() noexcept = 0;
   virtual int save(std::vector<std::byte>& state) noexcept = 0;

@@ -138,6 +138,11 @@ DRIVEBENCH_API int drivebench_bridge_mean(drivebench_bridge* bridge, drivebench_
 
 /** The load torque [N*m] from now on; positive opposes a positive torque of the machine. */
 DRIVEBENCH_API int drivebench_bridge_set_load(drivebench_bridge* bridge, double load_nm);
+/** Reads a parameter of the axis by the name that drivebench_describe() gives it. */
+DRIVEBENCH_API int drivebench_bridge_get_parameter(drivebench_bridge* bridge, const char* name,
+                                                   double* value);
+/** Writes one that is live, from now on: a resistance, a friction, the supply. Saved with the state. */
+DRIVEBENCH_API int drivebench_bridge_set_parameter(drivebench_bridge* bridge, const char* name, double value);
 /** Puts a fault in force, as drivebench_inject() does, from now on; 0 takes it away. */
 DRIVEBENCH_API int drivebench_bridge_inject(drivebench_bridge* bridge, const char* name, double value);
 /** Clears latched faults; the legs close again with the next tick of the bench file. */

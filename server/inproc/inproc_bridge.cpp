@@ -10,12 +10,13 @@
 
 #include "plant/drive/phases.hpp"
 #include "plant/math/trig.hpp"
+#include "plant/parameters/parameters.hpp"
 #include "server/bench/change_requests.hpp"
 
 namespace drivebench {
 namespace {
 
-constexpr std::uint64_t kMagic = 0x3165'6764'7262'6264u;  // "dbbrdge1"
+constexpr std::uint64_t kMagic = 0x3265'6764'7262'6264u;  // "dbbrdge2"
 constexpr std::uint64_t kLastPs = 9'000'000'000'000'000'000u;
 constexpr std::uint64_t kShortestPeriodPs = 100'000;
 constexpr std::uint64_t kLongestPeriodPs = 1'000'000'000'000;
@@ -28,8 +29,12 @@ std::uint64_t digest_of(std::span<const std::byte> bytes, std::uint64_t hash) no
 }
 
 template <class Mark>
-std::uint64_t digest_of(const Mark& mark, std::span<const std::byte> axis) noexcept {
-  return digest_of(axis, digest_of(std::as_bytes(std::span(&mark, 1)), 14695981039346656037ULL));
+std::uint64_t digest_of(const Mark& mark, std::span<const std::byte> rest) noexcept {
+  return digest_of(rest, digest_of(std::as_bytes(std::span(&mark, 1)), 14695981039346656037ULL));
+}
+
+std::size_t live_count(const AxisParameters& p) noexcept {
+  return static_cast<std::size_t>(std::ranges::count_if(axis_parameters(p), &Parameter::live));
 }
 
 drivebench_bridge_edge edge_of(const GateEdge& edge) noexcept {
@@ -247,6 +252,52 @@ int InprocBridge::set_load(double load_nm) noexcept {
   return DRIVEBENCH_OK;
 }
 
+int InprocBridge::get_parameter(const char* name, double& value) noexcept {
+  const Parameter* const row = find_parameter(axis_.parameters(), name);
+  if (row == nullptr) return fail(DRIVEBENCH_UNKNOWN_PARAMETER, unknown_parameter(axis_.parameters(), name));
+  value = row->get(axis_.parameters());
+  return DRIVEBENCH_OK;
+}
+
+int InprocBridge::set_parameter(const char* name, double value) noexcept {
+  const ChangeView view{.parameters = axis_.parameters(),
+                        .shaft_of = {},
+                        .amplifier_of = {},
+                        .drives_another = false,
+                        .tick = 0};
+  const JudgedRequest judged = judge_parameter(view, name, value, 0, 0);
+  if (const auto* refused = std::get_if<RefusedRequest>(&judged)) {
+    return fail(static_cast<int>(refused->code), refused->sentence);
+  }
+  AxisParameters changed = axis_.parameters();
+  find_parameter(changed, name)->set(changed, value);
+  axis_.set_parameters(changed);
+  return DRIVEBENCH_OK;
+}
+
+std::vector<double> InprocBridge::live_values() const {
+  std::vector<double> values;
+  for (const Parameter& row : axis_parameters(axis_.parameters())) {
+    if (row.live) values.push_back(row.get(axis_.parameters()));
+  }
+  return values;
+}
+
+bool InprocBridge::take_live_values(std::span<const double> values) {
+  AxisParameters wanted = axis_.parameters();
+  std::size_t next = 0;
+  for (const Parameter& row : axis_parameters(wanted)) {
+    if (!row.live) continue;
+    const double value = values[next++];
+    if (value == row.get(wanted)) continue;
+    if (breaks_a_rule(row, value)) return false;
+    row.set(wanted, value);
+  }
+  if (breaks_a_rule(wanted)) return false;
+  axis_.set_parameters(wanted);
+  return true;
+}
+
 int InprocBridge::inject(const char* name, double value) noexcept {
   const JudgedRequest judged = judge_fault(name, value, 0);
   if (const auto* refused = std::get_if<RefusedRequest>(&judged)) {
@@ -262,12 +313,16 @@ int InprocBridge::clear() noexcept {
 }
 
 int InprocBridge::save(std::vector<std::byte>& state) noexcept {
+  const std::vector<double> values = live_values();
+  const auto parameters = std::as_bytes(std::span(values));
   const std::vector<std::byte> axis = axis_.save();
-  const Header header{
-      .magic = kMagic, .configuration = configuration_, .digest = digest_of(mark_, axis), .mark = mark_};
-  const auto bytes = std::as_bytes(std::span(&header, 1));
-  state.assign(bytes.begin(), bytes.end());
+  Header header{.magic = kMagic, .configuration = configuration_, .digest = 0, .mark = mark_};
+  const auto head = std::as_bytes(std::span(&header, 1));
+  state.resize(head.size());
+  state.insert(state.end(), parameters.begin(), parameters.end());
   state.insert(state.end(), axis.begin(), axis.end());
+  header.digest = digest_of(mark_, std::span(state).subspan(head.size()));
+  std::ranges::copy(head, state.begin());
   return DRIVEBENCH_OK;
 }
 
@@ -280,10 +335,16 @@ int InprocBridge::restore(std::span<const std::byte> state) noexcept {
   std::memcpy(&header, state.data(), sizeof(Header));
   if (header.magic != kMagic) return refuse("is none of a bridge");
   if (header.configuration != configuration_) return refuse("is of another bench file or axis");
-  const std::span<const std::byte> axis = state.subspan(sizeof(Header));
-  if (header.digest != digest_of(header.mark, axis)) return refuse("is damaged: its digest does not fit");
+  const std::span<const std::byte> rest = state.subspan(sizeof(Header));
+  if (header.digest != digest_of(header.mark, rest)) return refuse("is damaged: its digest does not fit");
+  std::vector<double> values(live_count(axis_.parameters()));
+  const auto parameters = std::as_writable_bytes(std::span(values));
+  if (rest.size() < parameters.size()) return refuse("is of another build");
+  std::ranges::copy(rest.first(parameters.size()), parameters.begin());
+  const std::vector<double> values_before = live_values();
   const std::vector<std::byte> before = axis_.save();
-  if (!axis_.restore(axis)) {
+  if (!take_live_values(values) || !axis_.restore(rest.subspan(parameters.size()))) {
+    take_live_values(values_before);
     axis_.restore(before);
     return refuse("is of another build");
   }

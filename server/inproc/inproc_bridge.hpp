@@ -33,6 +33,8 @@ class InprocBridge final : public abi::Bridge {
   int mark() noexcept override;
   int mean(drivebench_bridge_means& means) noexcept override;
   int set_load(double load_nm) noexcept override;
+  int get_parameter(const char* name, double& value) noexcept override;
+  int set_parameter(const char* name, double value) noexcept override;
   int inject(const char* name, double value) noexcept override;
   int clear() noexcept override;
   int save(std::vector<std::byte>& state) noexcept override;
@@ -45,7 +47,8 @@ class InprocBridge final : public abi::Bridge {
     double angle_rad = 0.0;
     GateSums sums{};
   };
-  /// In front of the state of the axis in what save() gives.
+  /// In front of the live parameters, in the order of their table, and of the state of the axis in what
+  /// save() gives.
   struct Header {
     std::uint64_t magic;
     std::uint64_t configuration;
@@ -57,6 +60,9 @@ class InprocBridge final : public abi::Bridge {
   int check_time(const char* name, std::uint64_t at_ps) noexcept;
   int check_finite() noexcept;
   Mark mark_of_now() noexcept;
+  std::vector<double> live_values() const;
+  /// Whether the values are possible ones; else nothing has changed.
+  bool take_live_values(std::span<const double> values);
 
   GateAxis axis_;
   std::uint64_t configuration_;

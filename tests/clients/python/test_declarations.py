@@ -1,4 +1,4 @@
-"""The structs, codes and calls of the package `drivebench` are those of drivebench.h."""
+"""The structs, codes and calls of the package `drivebench` are those of drivebench.h and drivebench_bridge.h."""
 import copy
 import ctypes
 import ctypes.util
@@ -14,7 +14,8 @@ from wire_client import REPOSITORY  # noqa: E402
 import drivebench  # noqa: E402
 from drivebench import bench, library  # noqa: E402
 
-HEADER = re.sub(r"/\*.*?\*/", "", (REPOSITORY / "protocols/abi/drivebench.h").read_text(encoding="utf-8"), flags=re.DOTALL)
+HEADER = "".join(re.sub(r"/\*.*?\*/", "", (REPOSITORY / "protocols/abi" / name).read_text(encoding="utf-8"), flags=re.DOTALL)
+                 for name in ("drivebench.h", "drivebench_bridge.h"))
 TYPES = {"uint32_t": ctypes.c_uint32, "int32_t": ctypes.c_int32, "uint64_t": ctypes.c_uint64, "int64_t": ctypes.c_int64,
          "double": ctypes.c_double, "size_t": ctypes.c_size_t, "const char*": ctypes.c_char_p,
          "const drivebench_parameter*": ctypes.POINTER(library.ParameterStruct),
@@ -30,6 +31,11 @@ TYPES = {"uint32_t": ctypes.c_uint32, "int32_t": ctypes.c_int32, "uint64_t": cty
          "drivebench_bench**": ctypes.POINTER(ctypes.c_void_p), "const drivebench_options*": ctypes.POINTER(library.OptionsStruct),
          "const drivebench_command*": ctypes.POINTER(library.CommandStruct), "drivebench_sample*": ctypes.c_void_p,
          "double*": ctypes.POINTER(ctypes.c_double), "uint64_t*": ctypes.POINTER(ctypes.c_uint64),
+         "drivebench_bridge*": ctypes.c_void_p, "const drivebench_bridge*": ctypes.c_void_p,
+         "drivebench_bridge**": ctypes.POINTER(ctypes.c_void_p), "const drivebench_leg*": ctypes.POINTER(library.LegStruct),
+         "drivebench_bridge_edge*": ctypes.POINTER(library.BridgeEdgeStruct),
+         "drivebench_bridge_state*": ctypes.POINTER(library.BridgeStateStruct),
+         "drivebench_bridge_means*": ctypes.POINTER(library.BridgeMeansStruct), "int32_t*": ctypes.POINTER(ctypes.c_int32),
          "size_t*": ctypes.POINTER(ctypes.c_size_t), "void*": ctypes.c_void_p, "const void*": ctypes.c_char_p}
 
 
@@ -59,6 +65,8 @@ class Declarations(unittest.TestCase):
         for name, struct in (("command", library.CommandStruct), ("edge", library.EdgeStruct), ("signal", library.SignalStruct), ("axis", library.AxisStruct),
                              ("parameter", library.ParameterStruct), ("fault", library.FaultStruct),
                              ("injectable", library.InjectableStruct), ("event", library.EventStruct),
+                             ("leg", library.LegStruct), ("bridge_edge", library.BridgeEdgeStruct),
+                             ("bridge_state", library.BridgeStateStruct), ("bridge_means", library.BridgeMeansStruct),
                              ("description", library.DescriptionStruct),
                              ("options", library.OptionsStruct)):
             self.assertEqual(struct._fields_, members(name), name)
@@ -89,6 +97,8 @@ class Declarations(unittest.TestCase):
         for name, numbers in (("mode", drivebench.Mode), ("kind", drivebench.Kind), ("type", drivebench.Type),
                               ("gates", bench._Gates)):
             self.assertEqual({f"{name.upper()}_{each.name}": each.value for each in numbers}, enumerators(name))
+        self.assertEqual({f"LEG_{each.name}": each.value for each in drivebench.LegMode}, enumerators("leg_mode"))
+        self.assertEqual({f"EDGE_{each.name}": each.value for each in drivebench.EdgeKind}, enumerators("edge_kind"))
         with drivebench.Bench("inproc:servo") as opened:
             states = opened.describe().signals["state"].meaning
         self.assertEqual(", ".join(f"{each.value} {each.name.lower()}" for each in drivebench.State), states)

@@ -8,6 +8,7 @@
 #include <cstddef>
 #include <limits>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "tests/clients/sdk/leg_setting.hpp"
@@ -221,6 +222,104 @@ TEST(Bridge, AStateGoesOnInAnotherBridge) {
   Bridge board(kBoard);
   EXPECT_EQ(drivebench_bridge_restore(board.handle, state.data(), state.size()), DRIVEBENCH_MALFORMED);
   EXPECT_EQ(board.error(), "state is of another bench file or axis");
+}
+
+// A current that decays through the diodes of two legs dies in both at one instant. With room for one edge
+// the run stops at the first, and the other one belongs to the next run, whatever is set between. Catches: a
+// leg that is set at the very instant of an edge and drops it, or brings one again.
+TEST(Bridge, AnEdgeAtTheInstantOfASettingComesOnce) {
+  const auto deaths = [](std::uint64_t charged_ps, bool sets) {
+    Bridge bridge;
+    bridge.set(0, leg_at(DRIVEBENCH_LEG_HIGH));
+    bridge.set(1, leg_at(DRIVEBENCH_LEG_LOW));
+    EXPECT_EQ(bridge.run(charged_ps), DRIVEBENCH_OK);
+    for (const std::uint32_t leg : {0U, 1U})
+      bridge.set(leg, leg_at(DRIVEBENCH_LEG_OPEN));
+    std::vector<std::pair<std::uint64_t, std::uint32_t>> found;
+    for (std::uint64_t now_ps = 0; now_ps < 50 * kMicro;) {
+      drivebench_bridge_edge edge{};
+      std::size_t count = 0;
+      EXPECT_EQ(drivebench_bridge_run(bridge.handle, 50 * kMicro, &edge, 1, &count, &now_ps), DRIVEBENCH_OK);
+      if (count == 0 || edge.kind != DRIVEBENCH_EDGE_CURRENT_ZERO) continue;
+      found.emplace_back(edge.at_ps, edge.channel);
+      // c stays open, but a setting it is.
+      if (sets) bridge.set(2, leg_at(DRIVEBENCH_LEG_OPEN, 0, 0, 1000 * found.size()));
+    }
+    return found;
+  };
+  for (std::uint64_t charged_ps = 3 * kMicro; charged_ps < 4 * kMicro; charged_ps += 123'457) {
+    const auto alone = deaths(charged_ps, false);
+    ASSERT_EQ(alone.size(), 2U);
+    EXPECT_EQ(alone[0].first, alone[1].first);
+    EXPECT_EQ(deaths(charged_ps, true), alone);
+  }
+}
+
+/// What the bridge has as resistance of a phase, and the current after 1 ms between two legs.
+double current_after_writing(Bridge& bridge, double resistance_ohm) {
+  EXPECT_EQ(drivebench_bridge_set_parameter(bridge.handle, "machine.stator_resistance_ohm", resistance_ohm),
+            DRIVEBENCH_OK)
+      << bridge.error();
+  double value = 0.0;
+  EXPECT_EQ(drivebench_bridge_get_parameter(bridge.handle, "machine.stator_resistance_ohm", &value),
+            DRIVEBENCH_OK);
+  EXPECT_EQ(value, resistance_ohm);
+  const std::uint64_t until_ps = bridge.read().now_ps + 100 * kMicro;
+  EXPECT_EQ(bridge.run(until_ps), DRIVEBENCH_OK);
+  return bridge.read().current_a[0];
+}
+
+// The rotor is held. Catches: a parameter that is written and not in force from that instant on, one that a
+// look ahead of before lets slip, a state that is restored without it.
+TEST(Bridge, AParameterIsInForceFromTheInstantOfItsWriting) {
+  constexpr std::uint64_t kInstant = 33'333'333;
+  Bridge at_once;
+  Bridge looked;
+  for (Bridge* bridge : {&at_once, &looked}) {
+    bridge->align();
+    ASSERT_EQ(bridge->run(kInstant), DRIVEBENCH_OK);
+  }
+  drivebench_bridge_edge edge;
+  std::int32_t found = 0;
+  ASSERT_EQ(drivebench_bridge_next_edge(looked.handle, 200 * kMicro, &edge, &found), DRIVEBENCH_OK);
+  const std::vector<std::byte> before = at_once.save();
+  const double changed_a = current_after_writing(at_once, 2.0);
+  EXPECT_EQ(current_after_writing(looked, 2.0), changed_a);
+  EXPECT_EQ(looked.save(), at_once.save());
+  const std::vector<std::byte> after = at_once.save();
+
+  ASSERT_EQ(drivebench_bridge_restore(at_once.handle, before.data(), before.size()), DRIVEBENCH_OK);
+  ASSERT_EQ(at_once.run(kInstant + 100 * kMicro), DRIVEBENCH_OK);
+  EXPECT_NE(at_once.read().current_a[0], changed_a);
+  Bridge third;
+  ASSERT_EQ(drivebench_bridge_restore(third.handle, after.data(), after.size()), DRIVEBENCH_OK);
+  for (Bridge* bridge : {&third, &looked})
+    ASSERT_EQ(bridge->run(5000 * kMicro), DRIVEBENCH_OK);
+  EXPECT_EQ(third.save(), looked.save());
+}
+
+// Catches: a wrong name, a fixed parameter, a value beyond its limits that is taken or refused without a
+// word.
+TEST(Bridge, RefusesAParameterThatCannotBe) {
+  Bridge bridge;
+  const std::vector<std::byte> before = bridge.save();
+  double value = 0.0;
+  EXPECT_EQ(drivebench_bridge_set_parameter(bridge.handle, "machine.stator_resistance", 1.0),
+            DRIVEBENCH_UNKNOWN_PARAMETER);
+  EXPECT_EQ(bridge.error(),
+            "there is no parameter 'machine.stator_resistance'; did you mean "
+            "\"machine.stator_resistance_ohm\"?");
+  EXPECT_EQ(drivebench_bridge_get_parameter(bridge.handle, "nothing", &value), DRIVEBENCH_UNKNOWN_PARAMETER);
+  EXPECT_EQ(drivebench_bridge_set_parameter(bridge.handle, "encoder.counts_per_revolution", 400.0),
+            DRIVEBENCH_READ_ONLY);
+  EXPECT_EQ(drivebench_bridge_set_parameter(bridge.handle, "machine.stator_resistance_ohm", -1.0),
+            DRIVEBENCH_OUT_OF_RANGE);
+  EXPECT_EQ(drivebench_bridge_set_parameter(bridge.handle, "machine.stator_resistance_ohm", std::nan("")),
+            DRIVEBENCH_NOT_FINITE);
+  EXPECT_EQ(drivebench_bridge_set_parameter(bridge.handle, nullptr, 1.0), DRIVEBENCH_BAD_ARGUMENT);
+  EXPECT_EQ(drivebench_bridge_get_parameter(bridge.handle, "bus.voltage_v", nullptr),
+            DRIVEBENCH_BAD_ARGUMENT);
+  EXPECT_EQ(bridge.save(), before);
 }
 
 }  // namespace

@@ -12,6 +12,7 @@ command it brings, except in real time, where it returns with the next one.
 """
 from drivebench.aio import AsyncBench
 from drivebench.bench import OFF, SHORT, Bench, Command
+from drivebench.bridge import Bridge, BridgeEdge, EdgeKind, LegMode
 from drivebench.description import Axis, Description, Event, Fault, Injectable, Kind, Mode, Parameter, Signal, State, Type
 from drivebench.errors import (BadArgument, BenchClosed, Code, DrivebenchError, Failed, LibraryNotFound, LinkLost, NoBench,
                                OtherAbi, ProgramNotFound, Refused, ServerFailed)
@@ -20,7 +21,8 @@ from drivebench.recorder import Recorder
 from drivebench.recording import Recording, read_recording
 from drivebench.server import Server, serve
 
-__all__ = ["OFF", "SHORT", "AsyncBench", "Axis", "BadArgument", "Bench", "BenchClosed", "Code", "Command", "Description",
-           "DrivebenchError", "Event", "Failed", "Fault", "Injectable", "Kind", "LibraryNotFound", "LinkLost", "Mode", "NoBench",
+__all__ = ["OFF", "SHORT", "AsyncBench", "Axis", "BadArgument", "Bench", "BenchClosed", "Bridge", "BridgeEdge", "Code", "Command",
+           "Description", "DrivebenchError", "EdgeKind", "Event", "Failed", "Fault", "Injectable", "Kind", "LegMode", "LibraryNotFound", "LinkLost",
+           "Mode", "NoBench",
            "OtherAbi", "Parameter", "ProgramNotFound", "Recorder", "Recording", "Refused", "Sample", "Server",
            "ServerFailed", "Signal", "State", "Type", "read_recording", "serve", "version"]

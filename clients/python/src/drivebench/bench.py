@@ -86,7 +86,7 @@ class Bench:
         if code != Code.OK:
             raise library.error_for(code, None)
         self.address = address
-        self._handle = Handle(library, pointer)
+        self._handle = Handle(pointer, library.close, library.error_for, "bench")
         self._finalizer = weakref.finalize(self, self._handle.close)  # also at exit
         self._library = library
         self._description_struct = library.describe(pointer).contents

@@ -1,4 +1,4 @@
-"""libdrivebench, found and declared: the structs and calls of drivebench.h, through ctypes.
+"""libdrivebench, found and declared: the structs and calls of drivebench.h and drivebench_bridge.h, through ctypes.
 
 The signals of a sample are not listed here: the library describes them, and Sample is made from that.
 """
@@ -78,7 +78,34 @@ class OptionsStruct(ctypes.Structure):
                 ("clear_on_acquire", ctypes.c_int32), ("conducts", ctypes.c_int32)]
 
 
+class LegStruct(ctypes.Structure):
+    _fields_ = [("mode", ctypes.c_uint32), ("centred", ctypes.c_uint32), ("period_start_ps", ctypes.c_uint64),
+                ("period_ps", ctypes.c_uint64), ("compare_ps", ctypes.c_uint64), ("dead_ps", ctypes.c_uint64)]
+
+
+class BridgeEdgeStruct(ctypes.Structure):
+    _fields_ = [("at_ps", ctypes.c_uint64), ("kind", ctypes.c_uint32), ("channel", ctypes.c_uint32), ("level", ctypes.c_uint32),
+                ("reserved", ctypes.c_uint32)]
+
+
+class BridgeStateStruct(ctypes.Structure):
+    _fields_ = [("now_ps", ctypes.c_uint64), ("current_a", ctypes.c_double * 3), ("terminal_v", ctypes.c_double * 3),
+                ("bus_v", ctypes.c_double), ("angle_rad", ctypes.c_double), ("speed_rad_s", ctypes.c_double),
+                ("torque_nm", ctypes.c_double), ("load_nm", ctypes.c_double), ("magnetic_j", ctypes.c_double),
+                ("comparator_v", ctypes.c_double * 3), ("comparator_levels", ctypes.c_uint64), ("hall_lines", ctypes.c_uint64),
+                ("encoder_count", ctypes.c_int64), ("legs", ctypes.c_uint64), ("faults", ctypes.c_uint64),
+                ("lost_edges", ctypes.c_uint64)]
+
+
+class BridgeMeansStruct(ctypes.Structure):
+    _fields_ = [("since_ps", ctypes.c_uint64), ("time_s", ctypes.c_double), ("current_a", ctypes.c_double * 3),
+                ("terminal_v", ctypes.c_double * 3), ("bus_v", ctypes.c_double), ("link_a", ctypes.c_double),
+                ("torque_nm", ctypes.c_double), ("speed_rad_s", ctypes.c_double), ("link_j", ctypes.c_double),
+                ("electrical_j", ctypes.c_double), ("copper_j", ctypes.c_double), ("shaft_j", ctypes.c_double)]
+
+
 _BENCH = ctypes.c_void_p
+_BRIDGE = ctypes.c_void_p
 _AXIS = ctypes.c_uint32
 _TICKS = ctypes.c_uint64
 
@@ -101,6 +128,22 @@ _CALLS: dict[str, tuple[Any, ...]] = {
     "reset": (_BENCH,),
     "save": (_BENCH, ctypes.c_void_p, ctypes.POINTER(ctypes.c_size_t)),
     "restore": (_BENCH, ctypes.c_char_p, ctypes.c_size_t),
+    "bridge_open_abi": (ctypes.c_char_p, ctypes.c_uint32, ctypes.c_uint32, ctypes.c_size_t, ctypes.c_size_t,
+                        ctypes.POINTER(_BRIDGE)),
+    "bridge_set": (_BRIDGE, ctypes.c_uint32, ctypes.POINTER(LegStruct)),
+    "bridge_run": (_BRIDGE, ctypes.c_uint64, ctypes.POINTER(BridgeEdgeStruct), ctypes.c_size_t, ctypes.POINTER(ctypes.c_size_t),
+                   ctypes.POINTER(ctypes.c_uint64)),
+    "bridge_next_edge": (_BRIDGE, ctypes.c_uint64, ctypes.POINTER(BridgeEdgeStruct), ctypes.POINTER(ctypes.c_int32)),
+    "bridge_read": (_BRIDGE, ctypes.POINTER(BridgeStateStruct)),
+    "bridge_mark": (_BRIDGE,),
+    "bridge_mean": (_BRIDGE, ctypes.POINTER(BridgeMeansStruct)),
+    "bridge_set_load": (_BRIDGE, ctypes.c_double),
+    "bridge_get_parameter": (_BRIDGE, ctypes.c_char_p, ctypes.POINTER(ctypes.c_double)),
+    "bridge_set_parameter": (_BRIDGE, ctypes.c_char_p, ctypes.c_double),
+    "bridge_inject": (_BRIDGE, ctypes.c_char_p, ctypes.c_double),
+    "bridge_clear": (_BRIDGE,),
+    "bridge_save": (_BRIDGE, ctypes.c_void_p, ctypes.POINTER(ctypes.c_size_t)),
+    "bridge_restore": (_BRIDGE, ctypes.c_char_p, ctypes.c_size_t),
 }
 # The calls that give something else.
 _OTHERS: dict[str, tuple[Any, tuple[Any, ...]]] = {
@@ -109,6 +152,8 @@ _OTHERS: dict[str, tuple[Any, tuple[Any, ...]]] = {
     "error_field": (ctypes.c_char_p, (_BENCH,)),
     "describe": (ctypes.POINTER(DescriptionStruct), (_BENCH,)),
     "version": (ctypes.c_char_p, ()),
+    "bridge_close": (None, (_BRIDGE,)),
+    "bridge_error": (ctypes.c_char_p, (_BRIDGE,)),
 }
 
 
@@ -201,6 +246,10 @@ class Library:
     def error_for(self, code: int, bench: Any) -> DrivebenchError:
         """The exception for what the last call on the bench gave; None: for the last open."""
         return error_of(code, text(self.error(bench)), text(self.error_field(bench)))
+
+    def bridge_error_for(self, code: int, bridge: Any) -> DrivebenchError:
+        """The same for a bridge."""
+        return error_of(code, text(self.bridge_error(bridge)), "")
 
 
 def _places() -> Iterator[str]:
