@@ -16,6 +16,7 @@
 #include "clients/identification/motors/motors.hpp"
 #include "clients/identification/motors/saturated_induction.hpp"
 #include "clients/identification/motors/terminal_voltages.hpp"
+#include "plant/math/phasor.hpp"
 
 namespace drivebench::identification {
 namespace {
@@ -41,7 +42,7 @@ struct Measured {
     const double electrical_rad = pole_pairs * value_at(shaft.angle, static_cast<double>(sample) + part);
     return {.u = voltages.at(sample, part),
             .electrical_rad = electrical_rad,
-            .direction = std::polar(1.0, electrical_rad)};
+            .direction = phasor(electrical_rad)};
   }
   std::array<double, 3> currents(std::size_t sample) const noexcept {
     std::array<double, 3> values{};
@@ -142,7 +143,7 @@ std::complex<double> flux_of(const InductionModel& model, const InductionInstant
   const std::complex<double> phi =
       (model.transient_h * (slope + std::complex<double>(model.gamma, omega_e) * i) - u) /
       std::complex<double>(model.rotor_rate, -omega_e);
-  return phi * std::polar(1.0, electrical_rad);
+  return phi * phasor(electrical_rad);
 }
 
 Resimulation run_induction(const InductionModel& model, const Measured& m, const MeasuredData& data,

@@ -6,6 +6,8 @@
 #include <optional>
 
 #include "clients/models/induction_machine.hpp"
+#include "plant/math/length.hpp"
+#include "plant/math/phasor.hpp"
 
 namespace drivebench {
 
@@ -35,7 +37,7 @@ struct InductionCircuit {
     double rotor_loss_w;
     double mechanical_w;  ///< torque times speed, friction of the shaft included
 
-    double power_factor() const noexcept { return active_w / std::hypot(active_w, reactive_var); }
+    double power_factor() const noexcept { return active_w / length(active_w, reactive_var); }
     /// Power out over power in, of a motor or of a generator; 0 where neither delivers.
     double efficiency() const noexcept {
       if (active_w > 0.0 && mechanical_w > 0.0) return mechanical_w / active_w;
@@ -85,12 +87,12 @@ struct InductionCircuit {
   /// Of the largest torque: the rotor's R_R/S takes most from the rest of the circuit if it equals its
   /// impedance, |R_R/S| = |Z|.
   double pull_out_slip(Mode mode) const noexcept {
-    const double slip = rotor_ohm() / std::abs(seen_from_rotor_ohm());
+    const double slip = rotor_ohm() / magnitude(seen_from_rotor_ohm());
     return mode == Mode::kMotor ? slip : -slip;
   }
   /// Of the largest mechanical power, the same for R_R·(1−S)/S and the impedance R_R + Z.
   double largest_power_slip(Mode mode) const noexcept {
-    const double rest_ohm = std::abs(rotor_ohm() + seen_from_rotor_ohm());
+    const double rest_ohm = magnitude(rotor_ohm() + seen_from_rotor_ohm());
     return rotor_ohm() / (rotor_ohm() + (mode == Mode::kMotor ? rest_ohm : -rest_ohm));
   }
   /// Of the best power factor at the terminals without R_S: √σ times the pull-out slip R_R/(σ·ω·L_R), the
@@ -120,7 +122,7 @@ struct InductionCircuit {
     const Complex pole =
         -rotor_ohm() * stator_ohm() / (rotor_reactance_ohm() * stator_ohm() - mutual_ohm() * mutual_ohm());
     const Complex centre_a = stator_current_a(std::conj(pole));
-    return {centre_a, std::abs(stator_current_a(0.0) - centre_a)};
+    return {centre_a, magnitude(stator_current_a(0.0) - centre_a)};
   }
 
  private:

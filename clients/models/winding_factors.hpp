@@ -4,6 +4,8 @@
 #include <complex>
 #include <numbers>
 #include <span>
+#include "plant/math/phasor.hpp"
+#include "plant/math/trig.hpp"
 
 /// Distribution of a winding around the air gap: by which factor its field is smaller than that of as many
 /// turns in one place. Angles are electrical; `harmonic` is 1 for the fundamental. Source: the book, 7.4.1
@@ -14,19 +16,19 @@ namespace drivebench {
 inline double distribution_factor(std::span<const double> angles_rad, int harmonic) noexcept {
   std::complex<double> sum = 0.0;
   for (const double angle : angles_rad)
-    sum += std::polar(1.0, harmonic * angle);
-  return std::abs(sum) / static_cast<double>(angles_rad.size());
+    sum += phasor(harmonic * angle);
+  return magnitude(sum) / static_cast<double>(angles_rad.size());
 }
 
 /// A coil that spans `pitch` of a pole: sin(νπ·pitch/2), negative where the harmonic turns over.
 inline double pitch_factor(double pitch, int harmonic) noexcept {
-  return std::sin(harmonic * 0.5 * std::numbers::pi * pitch);
+  return sine(harmonic * 0.5 * std::numbers::pi * pitch);
 }
 
 /// Endlessly many loops, spread evenly over the belt π/m of one of m phases: sin(νπ/2m)/(νπ/2m).
 inline double even_distribution_factor(int phases, int harmonic) noexcept {
   const double half_belt_rad = harmonic * 0.5 * std::numbers::pi / phases;
-  return std::abs(std::sin(half_belt_rad) / half_belt_rad);
+  return std::abs(sine(half_belt_rad) / half_belt_rad);
 }
 
 }  // namespace drivebench

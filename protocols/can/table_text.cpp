@@ -290,7 +290,7 @@ std::vector<Choice> choices_of(const Field& field, std::span<const BitWord> word
 }
 
 std::optional<Range> range_of(const Field& field, const Profile& profile) {
-  const double count = std::exp2(field.bits);
+  const double count = std::ldexp(1.0, static_cast<int>(field.bits));
   const double unit = profile.unit_of(field.scale);
   switch (field.encoding) {
     case Encoding::kCounter:

@@ -13,24 +13,27 @@ TOPS = {
     "plant": ("plant", "protocols/signals"),
     "protocols": ("protocols",),
     "server": ("server", "plant", "protocols"),
-    "clients": ("clients", "protocols"),
+    "clients": ("clients", "protocols", "plant/math"),
 }
 GENERATED = {"bench.pb.h": ("protocols", "server", "clients")}
 
 # Folders that may include less than their top folder. Below clients these know no link and no command, and so no wire.
 NARROWER = {
     "protocols/signals": ("protocols/signals",),
-    "clients/models": ("clients/models", "protocols/signals"),
-    "clients/control": ("clients/control", "clients/models", "protocols/signals", "protocols/nearest_name.hpp"),
-    "clients/identification": ("clients/identification", "clients/models", "protocols/signals", "protocols/number_text.hpp"),
+    "plant/math": ("plant/math",),
+    "clients/models": ("clients/models", "plant/math", "protocols/signals"),
+    "clients/control": ("clients/control", "clients/models", "plant/math", "protocols/signals", "protocols/nearest_name.hpp"),
+    "clients/identification": ("clients/identification", "clients/models", "plant/math", "protocols/signals",
+                               "protocols/number_text.hpp"),
     "clients/link": ("clients/link", "protocols"),
-    "clients/regression": ("clients/regression", "protocols"),
+    "clients/regression": ("clients/regression", "plant/math", "protocols"),
 }
 
 # The headers allowed between < and >, where not all are.
 STANDARD = re.compile(r"[a-z_0-9]+$")
 SYSTEM = {
     "plant": re.compile(r"[a-z_0-9]+$|Eigen/"),
+    "plant/math": STANDARD,
     "protocols/signals": STANDARD,
     "protocols": re.compile(r"(?!boost/|sys/socket|sys/un|netinet/|arpa/|netdb|openssl/|modbus/|spdlog/|thread|mutex)"),
 }

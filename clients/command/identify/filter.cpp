@@ -15,6 +15,7 @@
 #include "clients/identification/data/measured_data.hpp"
 #include "clients/identification/data/signals.hpp"
 #include "clients/identification/math/filters.hpp"
+#include "plant/math/trig.hpp"
 #include "protocols/json.hpp"
 
 namespace drivebench::command {
@@ -64,9 +65,9 @@ Numbers numbers_of(const FilterOptions& o) {
   Numbers n;
   n.gains = {gain_at(whole, 0.6 * corner_rad_s), gain_at(whole, corner_rad_s),
              gain_at(whole, 2.0 * corner_rad_s)};
-  n.delay_s = 1.0 / std::sin(kPi / (2.0 * o.order)) / corner_rad_s;
+  n.delay_s = 1.0 / sine(kPi / (2.0 * o.order)) / corner_rad_s;
   n.plain = identification::bilinear(whole, period_s);
-  n.plain_corner_hz = o.rate_hz / kPi * std::atan(kPi * o.cutoff_hz / o.rate_hz);
+  n.plain_corner_hz = o.rate_hz / kPi * arctangent2(kPi * o.cutoff_hz, o.rate_hz);
   n.exact = identification::bilinear(whole, period_s, corner_rad_s);
   return n;
 }

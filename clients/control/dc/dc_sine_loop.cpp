@@ -21,7 +21,8 @@ DcSineLoop::DcSineLoop(const DcSineLoopParameters& p) noexcept
     : DcController(p.axis, Law::kCurrent), gains_(p.loop) {
   const double t_s = p.axis.period_s();
   const double square = p.loop.angular_frequency_rad_s * p.loop.angular_frequency_rad_s;
-  over_period_ = exponential(Matrix<3, 3>{{{0.0, t_s, 0.0}, {-square * t_s, 0.0, t_s}, {0.0, 0.0, 0.0}}});
+  over_period_ =
+      matrix_exponential(Matrix<3, 3>{{{0.0, t_s, 0.0}, {-square * t_s, 0.0, t_s}, {0.0, 0.0, 0.0}}});
 }
 
 double DcSineLoop::wanted(const Reference& r, const ShaftEstimate& shaft, double) noexcept {

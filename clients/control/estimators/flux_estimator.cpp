@@ -1,7 +1,9 @@
 #include "clients/control/estimators/flux_estimator.hpp"
 
-#include <cmath>
 #include <string_view>
+#include "plant/math/length.hpp"
+#include "plant/math/trig.hpp"
+#include "plant/math/unbounded.hpp"
 
 namespace drivebench::control {
 namespace {
@@ -22,41 +24,41 @@ struct Polar {
   double magnitude_wb;
   double angle_rad;
 };
-Polar polar(PhasePair flux_wb) noexcept {
-  return {.magnitude_wb = std::hypot(flux_wb.a, flux_wb.b), .angle_rad = std::atan2(flux_wb.b, flux_wb.a)};
+Polar polar(TwoPhase flux_wb) noexcept {
+  return {.magnitude_wb = length(flux_wb.a, flux_wb.b), .angle_rad = arctangent2(flux_wb.b, flux_wb.a)};
 }
 
-Polar seen(const PolarFluxObserver& observer, PhasePair, double) noexcept {
+Polar seen(const PolarFluxObserver& observer, TwoPhase, double) noexcept {
   return {.magnitude_wb = observer.magnitude_wb(), .angle_rad = observer.angle_rad()};
 }
-Polar seen(const StationaryFluxObserver& observer, PhasePair, double) noexcept {
+Polar seen(const StationaryFluxObserver& observer, TwoPhase, double) noexcept {
   return polar(observer.flux_wb());
 }
-Polar seen(const VergheseSandersObserver& observer, PhasePair current_a, double) noexcept {
+Polar seen(const VergheseSandersObserver& observer, TwoPhase current_a, double) noexcept {
   return polar(observer.flux_wb(current_a));
 }
-Polar seen(const MartinRouchonObserver& observer, PhasePair current_a, double) noexcept {
+Polar seen(const MartinRouchonObserver& observer, TwoPhase current_a, double) noexcept {
   return polar(observer.flux_wb(current_a));
 }
-Polar seen(const RotorFrameObserver& observer, PhasePair, double shaft_angle_rad) noexcept {
+Polar seen(const RotorFrameObserver& observer, TwoPhase, double shaft_angle_rad) noexcept {
   return polar(observer.flux_wb(shaft_angle_rad));
 }
 
 using Held = FluxEstimator::Held;
 
-void carry(PolarFluxObserver& observer, const Held& held, PhasePair) noexcept {
+void carry(PolarFluxObserver& observer, const Held& held, TwoPhase) noexcept {
   observer.step(held.current_a, held.speed_rad_s);
 }
-void carry(StationaryFluxObserver& observer, const Held& held, PhasePair current_a) noexcept {
+void carry(StationaryFluxObserver& observer, const Held& held, TwoPhase current_a) noexcept {
   observer.step(current_a, held.speed_rad_s);
 }
-void carry(VergheseSandersObserver& observer, const Held& held, PhasePair current_a) noexcept {
+void carry(VergheseSandersObserver& observer, const Held& held, TwoPhase current_a) noexcept {
   observer.step(current_a, held.voltage_v, held.speed_rad_s);
 }
-void carry(MartinRouchonObserver& observer, const Held& held, PhasePair current_a) noexcept {
+void carry(MartinRouchonObserver& observer, const Held& held, TwoPhase current_a) noexcept {
   observer.step(current_a, held.voltage_v, held.speed_rad_s);
 }
-void carry(RotorFrameObserver& observer, const Held& held, PhasePair current_a) noexcept {
+void carry(RotorFrameObserver& observer, const Held& held, TwoPhase current_a) noexcept {
   observer.step(current_a, held.shaft_angle_rad);
 }
 
@@ -94,8 +96,8 @@ std::vector<std::string> FluxEstimatorParameters::problems(const std::string& pr
 FluxEstimator::Observer FluxEstimator::observer_of(const InductionMachineModel& machine,
                                                    const FluxEstimatorParameters& p,
                                                    double period_s) noexcept {
-  const PhasePair start_wb = {.a = p.start_wb, .b = 0.0};
-  constexpr PhasePair kNoCurrent = {.a = 0.0, .b = 0.0};
+  const TwoPhase start_wb = {.a = p.start_wb, .b = 0.0};
+  constexpr TwoPhase kNoCurrent = {.a = 0.0, .b = 0.0};
   const auto copy = [&](FluxStep how) {
     StationaryFluxObserver observer(machine, period_s, how);
     observer.start_at(start_wb);
@@ -145,14 +147,14 @@ std::optional<FluxEstimator::Motion> FluxEstimator::motion() const noexcept {
 }
 
 void FluxEstimator::step(const Held& held) noexcept {
-  PhasePair current_a{.a = 0.0, .b = 0.0};
+  TwoPhase current_a{.a = 0.0, .b = 0.0};
   if (!std::holds_alternative<PolarFluxObserver>(observer_))  // which takes it along the flux
-    current_a = Direction::at(angle_rad_).to_ab(held.current_a);
+    current_a = to_ab(held.current_a, cos_sin_unbounded(angle_rad_));
   std::visit([&](auto& observer) { carry(observer, held, current_a); }, observer_);
   sample(current_a, held.shaft_angle_rad + period_s_ * held.speed_rad_s);
 }
 
-void FluxEstimator::sample(PhasePair current_a, double shaft_angle_rad) noexcept {
+void FluxEstimator::sample(TwoPhase current_a, double shaft_angle_rad) noexcept {
   const Polar flux =
       std::visit([&](const auto& observer) { return seen(observer, current_a, shaft_angle_rad); }, observer_);
   magnitude_wb_ = flux.magnitude_wb;

@@ -64,13 +64,13 @@ class FluxEstimator {
 
   /// Held over the period that begins.
   struct Held {
-    DirectQuadrature current_a;  ///< along the estimate
-    PhasePair voltage_v;
+    Dq current_a;  ///< along the estimate
+    TwoPhase voltage_v;
     double speed_rad_s;
     double shaft_angle_rad;
   };
   void step(const Held& held) noexcept;
-  void sample(PhasePair current_a, double shaft_angle_rad) noexcept;
+  void sample(TwoPhase current_a, double shaft_angle_rad) noexcept;
 
  private:
   using Observer = std::variant<PolarFluxObserver, StationaryFluxObserver, VergheseSandersObserver,

@@ -1,17 +1,19 @@
 #include "clients/control/estimators/flux_observers.hpp"
 
-#include <cmath>
+#include "plant/math/exponential.hpp"
+#include "plant/math/phasor.hpp"
+#include "plant/math/unbounded.hpp"
 
 namespace drivebench::control {
 namespace {
 
 using Complex = std::complex<double>;
 
-Complex complex_of(PhasePair x) noexcept {
+Complex complex_of(TwoPhase x) noexcept {
   return {x.a, x.b};
 }
 
-PhasePair pair_of(Complex x) noexcept {
+TwoPhase pair_of(Complex x) noexcept {
   return {x.real(), x.imag()};
 }
 
@@ -22,8 +24,8 @@ Complex flux_rate(const InductionMachineModel& machine, double speed_rad_s) noex
 
 /// x after a time of dx/dt = −rate·x + input.
 Complex relaxed(Complex x, Complex rate, Complex input, double time_s) noexcept {
-  const Complex decay = std::exp(-rate * time_s);
-  return decay * x + (1.0 - decay) / rate * input;
+  const Complex decay = phasor(-rate.imag() * time_s, exponential(-rate.real() * time_s));
+  return decay * x + quotient(1.0 - decay, rate) * input;
 }
 
 }  // namespace
@@ -32,7 +34,7 @@ StationaryFluxObserver::StationaryFluxObserver(const InductionMachineModel& mach
                                                FluxStep kind) noexcept
     : machine_(machine), period_s_(period_s), kind_(kind) {}
 
-void StationaryFluxObserver::step(PhasePair current_a, double speed_rad_s) noexcept {
+void StationaryFluxObserver::step(TwoPhase current_a, double speed_rad_s) noexcept {
   const std::complex<double> rate = flux_rate(machine_, speed_rad_s);
   const std::complex<double> input =
       machine_.flux_decay_per_s() * machine_.mutual_inductance_h * complex_of(current_a);
@@ -61,15 +63,15 @@ std::complex<double> VergheseSandersObserver::flux(std::complex<double> current_
   return (z_wb_ + gain_ * motor_.leakage_inductance_h() * current_a) / share_;
 }
 
-PhasePair VergheseSandersObserver::flux_wb(PhasePair current_a) const noexcept {
+TwoPhase VergheseSandersObserver::flux_wb(TwoPhase current_a) const noexcept {
   return pair_of(flux(complex_of(current_a)));
 }
 
-void VergheseSandersObserver::start_at(PhasePair flux_wb, PhasePair current_a) noexcept {
+void VergheseSandersObserver::start_at(TwoPhase flux_wb, TwoPhase current_a) noexcept {
   z_wb_ = share_ * complex_of(flux_wb) - gain_ * motor_.leakage_inductance_h() * complex_of(current_a);
 }
 
-void VergheseSandersObserver::step(PhasePair current_a, PhasePair voltage_v, double speed_rad_s) noexcept {
+void VergheseSandersObserver::step(TwoPhase current_a, TwoPhase voltage_v, double speed_rad_s) noexcept {
   const InductionMachineModel& machine = motor_.machine;
   const std::complex<double> i = complex_of(current_a);
   const std::complex<double> rate = flux_rate(machine, speed_rad_s) / share_;
@@ -89,17 +91,17 @@ MartinRouchonObserver::MartinRouchonObserver(const InductionMotorModel& motor, d
       flux_gain_(r1 * r2 / stiffness_),
       current_gain_h_((r1 + r2) / stiffness_) {}
 
-PhasePair MartinRouchonObserver::flux_wb(PhasePair current_a) const noexcept {
+TwoPhase MartinRouchonObserver::flux_wb(TwoPhase current_a) const noexcept {
   return pair_of((stator_flux_wb_ - motor_.leakage_inductance_h() * complex_of(current_a)) /
                  motor_.stator_share());
 }
 
-void MartinRouchonObserver::start_at(PhasePair stator_flux_wb, PhasePair current_a) noexcept {
+void MartinRouchonObserver::start_at(TwoPhase stator_flux_wb, TwoPhase current_a) noexcept {
   stator_flux_wb_ = complex_of(stator_flux_wb);
   current_a_ = complex_of(current_a);
 }
 
-void MartinRouchonObserver::step(PhasePair current_a, PhasePair voltage_v, double speed_rad_s) noexcept {
+void MartinRouchonObserver::step(TwoPhase current_a, TwoPhase voltage_v, double speed_rad_s) noexcept {
   const std::complex<double> i = complex_of(current_a);
   const std::complex<double> u = complex_of(voltage_v);
   const std::complex<double> s = motor_.machine.rotor_inductance_h * flux_rate(motor_.machine, speed_rad_s);
@@ -129,16 +131,16 @@ void MartinRouchonObserver::step(PhasePair current_a, PhasePair voltage_v, doubl
 RotorFrameObserver::RotorFrameObserver(const InductionMachineModel& machine, const LoadObserverGains& gains,
                                        double period_s) noexcept
     : machine_(machine),
-      kept_(std::exp(-machine.flux_decay_per_s() * period_s)),
+      kept_(exponential(-machine.flux_decay_per_s() * period_s)),
       motion_(machine, gains, period_s) {}
 
-PhasePair RotorFrameObserver::flux_wb(double shaft_angle_rad) const noexcept {
-  const Direction rotor = Direction::at(machine_.pole_pairs * shaft_angle_rad);
-  return rotor.to_ab({.d = flux_wb_.a, .q = flux_wb_.b});
+TwoPhase RotorFrameObserver::flux_wb(double shaft_angle_rad) const noexcept {
+  const CosSin rotor = cos_sin_unbounded(machine_.pole_pairs * shaft_angle_rad);
+  return to_ab({.d = flux_wb_.a, .q = flux_wb_.b}, rotor);
 }
 
-void RotorFrameObserver::step(PhasePair current_a, double shaft_angle_rad) noexcept {
-  const DirectQuadrature i = Direction::at(machine_.pole_pairs * shaft_angle_rad).to_dq(current_a);
+void RotorFrameObserver::step(TwoPhase current_a, double shaft_angle_rad) noexcept {
+  const Dq i = to_dq(current_a, cos_sin_unbounded(machine_.pole_pairs * shaft_angle_rad));
   motion_.step(shaft_angle_rad, machine_.acceleration_per_wb_a() * (flux_wb_.a * i.q - flux_wb_.b * i.d));
   const double gain_h = (1.0 - kept_) * machine_.mutual_inductance_h;
   flux_wb_ = {.a = kept_ * flux_wb_.a + gain_h * i.d, .b = kept_ * flux_wb_.b + gain_h * i.q};

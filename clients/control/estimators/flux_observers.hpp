@@ -3,8 +3,8 @@
 #include <complex>
 
 #include "clients/control/estimators/load_observers.hpp"
-#include "clients/control/math/frames.hpp"
 #include "clients/models/induction_machine.hpp"
+#include "plant/math/frames.hpp"
 
 // Observers of the rotor flux of an induction machine beside the polar one. In complex form, ψ = ψ_a + j·ψ_b
 // in the stator frame, the flux obeys
@@ -23,9 +23,9 @@ class StationaryFluxObserver {
  public:
   StationaryFluxObserver(const InductionMachineModel& machine, double period_s, FluxStep kind) noexcept;
 
-  PhasePair flux_wb() const noexcept { return {flux_wb_.real(), flux_wb_.imag()}; }
-  void start_at(PhasePair flux_wb) noexcept { flux_wb_ = {flux_wb.a, flux_wb.b}; }
-  void step(PhasePair current_a, double speed_rad_s) noexcept;
+  TwoPhase flux_wb() const noexcept { return {flux_wb_.real(), flux_wb_.imag()}; }
+  void start_at(TwoPhase flux_wb) noexcept { flux_wb_ = {flux_wb.a, flux_wb.b}; }
+  void step(TwoPhase current_a, double speed_rad_s) noexcept;
 
  private:
   InductionMachineModel machine_;
@@ -50,9 +50,9 @@ class VergheseSandersObserver {
   VergheseSandersObserver(const InductionMotorModel& motor, double gain, double period_s) noexcept;
 
   /// With the current of the sample.
-  PhasePair flux_wb(PhasePair current_a) const noexcept;
-  void start_at(PhasePair flux_wb, PhasePair current_a) noexcept;
-  void step(PhasePair current_a, PhasePair voltage_v, double speed_rad_s) noexcept;
+  TwoPhase flux_wb(TwoPhase current_a) const noexcept;
+  void start_at(TwoPhase flux_wb, TwoPhase current_a) noexcept;
+  void step(TwoPhase current_a, TwoPhase voltage_v, double speed_rad_s) noexcept;
   /// η/(1 − k·M/L_R) [1/s]
   double error_decay_per_s() const noexcept;
 
@@ -79,12 +79,12 @@ class MartinRouchonObserver {
   /// Rates r1 ≠ r2, both positive [1/H]; the error decays at R_R·r1 and R_R·r2.
   MartinRouchonObserver(const InductionMotorModel& motor, double r1, double r2, double period_s) noexcept;
 
-  PhasePair stator_flux_wb() const noexcept { return {stator_flux_wb_.real(), stator_flux_wb_.imag()}; }
-  PhasePair current_a() const noexcept { return {current_a_.real(), current_a_.imag()}; }
+  TwoPhase stator_flux_wb() const noexcept { return {stator_flux_wb_.real(), stator_flux_wb_.imag()}; }
+  TwoPhase current_a() const noexcept { return {current_a_.real(), current_a_.imag()}; }
   /// Of the rotor, with the measured current of the sample.
-  PhasePair flux_wb(PhasePair current_a) const noexcept;
-  void start_at(PhasePair stator_flux_wb, PhasePair current_a) noexcept;
-  void step(PhasePair current_a, PhasePair voltage_v, double speed_rad_s) noexcept;
+  TwoPhase flux_wb(TwoPhase current_a) const noexcept;
+  void start_at(TwoPhase stator_flux_wb, TwoPhase current_a) noexcept;
+  void step(TwoPhase current_a, TwoPhase voltage_v, double speed_rad_s) noexcept;
   double flux_gain() const noexcept { return flux_gain_; }            ///< c1, a pure number
   double current_gain_h() const noexcept { return current_gain_h_; }  ///< c2
 
@@ -110,17 +110,17 @@ class RotorFrameObserver {
                      double period_s) noexcept;
 
   /// In the stator frame, with the measured shaft angle of the same sample.
-  PhasePair flux_wb(double shaft_angle_rad) const noexcept;
-  PhasePair rotor_frame_flux_wb() const noexcept { return flux_wb_; }
+  TwoPhase flux_wb(double shaft_angle_rad) const noexcept;
+  TwoPhase rotor_frame_flux_wb() const noexcept { return flux_wb_; }
   double speed_rad_s() const noexcept { return motion_.speed_rad_s(); }
   double load_nm() const noexcept { return motion_.load_nm(); }
-  void start_at(PhasePair rotor_frame_flux_wb) noexcept { flux_wb_ = rotor_frame_flux_wb; }
-  void step(PhasePair current_a, double shaft_angle_rad) noexcept;
+  void start_at(TwoPhase rotor_frame_flux_wb) noexcept { flux_wb_ = rotor_frame_flux_wb; }
+  void step(TwoPhase current_a, double shaft_angle_rad) noexcept;
 
  private:
   InductionMachineModel machine_;
   double kept_;  // exp(−η·T)
-  PhasePair flux_wb_{.a = 0.0, .b = 0.0};
+  TwoPhase flux_wb_{.a = 0.0, .b = 0.0};
   LoadTorqueObserver motion_;
 };
 

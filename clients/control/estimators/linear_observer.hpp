@@ -144,7 +144,7 @@ class LinearObserver {
       for (std::size_t k = 0; k < M; ++k)
         joint[i][N + k] = period_s * s.b[i][k];
     }
-    const Matrix<N + M, N + M> over_period = exponential(joint);
+    const Matrix<N + M, N + M> over_period = matrix_exponential(joint);
     Matrix<N, N> model{};
     Matrix<N, M> inputs{};
     for (std::size_t i = 0; i < N; ++i) {
@@ -153,7 +153,8 @@ class LinearObserver {
       for (std::size_t k = 0; k < M; ++k)
         inputs[i][k] = over_period[i][N + k];
     }
-    const Polynomial<N> poles = characteristic_polynomial(exponential(scaled(s.error_matrix(), period_s)));
+    const Polynomial<N> poles =
+        characteristic_polynomial(matrix_exponential(scaled(s.error_matrix(), period_s)));
     Matrix<N, 1> injection = injection_for(poles, model, s.c);
     if (!std::isfinite(injection[0][0])) injection = scaled(s.l, period_s);
     transition_ = sum(model, product(injection, s.c), -1.0);

@@ -1,4 +1,5 @@
 #include "clients/control/estimators/load_observers.hpp"
+#include "plant/math/unbounded.hpp"
 
 namespace drivebench::control {
 
@@ -23,11 +24,11 @@ CoupledObserver::CoupledObserver(const InductionMachineModel& machine, const Spe
       flux_(machine, period_s),
       speed_(gains, machine.friction_rate_per_s(), period_s) {}
 
-void CoupledObserver::step(PhasePair current_a, double shaft_angle_rad) noexcept {
-  step(Direction::at(flux_.angle_rad()).to_dq(current_a), shaft_angle_rad);
+void CoupledObserver::step(TwoPhase current_a, double shaft_angle_rad) noexcept {
+  step(to_dq(current_a, cos_sin_unbounded(flux_.angle_rad())), shaft_angle_rad);
 }
 
-void CoupledObserver::step(DirectQuadrature current_a, double shaft_angle_rad) noexcept {
+void CoupledObserver::step(Dq current_a, double shaft_angle_rad) noexcept {
   const double motor_rad_s2 = acceleration_per_wb_a_ * flux_.magnitude_wb() * current_a.q;
   flux_.step(current_a, speed_.speed_rad_s());
   speed_.step(shaft_angle_rad, motor_rad_s2);

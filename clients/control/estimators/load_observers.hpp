@@ -60,9 +60,9 @@ class CoupledObserver {
   double flux_angle_rad() const noexcept { return flux_.angle_rad(); }
   double angle_rad() const noexcept { return speed_.angle_rad(); }
   double speed_rad_s() const noexcept { return speed_.speed_rad_s(); }
-  void step(PhasePair current_a, double shaft_angle_rad) noexcept;
+  void step(TwoPhase current_a, double shaft_angle_rad) noexcept;
   /// With currents already along ρ̂.
-  void step(DirectQuadrature current_a, double shaft_angle_rad) noexcept;
+  void step(Dq current_a, double shaft_angle_rad) noexcept;
 
  private:
   double acceleration_per_wb_a_;  // μ

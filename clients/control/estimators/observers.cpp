@@ -1,6 +1,7 @@
 #include "clients/control/estimators/observers.hpp"
 
 #include <algorithm>
+#include "clients/control/math/wrapped.hpp"
 
 namespace drivebench::control {
 
@@ -9,7 +10,7 @@ PolarFluxObserver::PolarFluxObserver(const InductionMachineModel& machine, doubl
       gain_(machine.flux_decay_per_s() * machine.mutual_inductance_h * period_s),
       pole_pairs_t_s_(machine.pole_pairs * period_s) {}
 
-void PolarFluxObserver::step(DirectQuadrature current_a, double speed_rad_s) noexcept {
+void PolarFluxObserver::step(Dq current_a, double speed_rad_s) noexcept {
   constexpr double kLeastDivisorWb = 1e-3;
   angle_rad_ = wrapped(angle_rad_ + pole_pairs_t_s_ * speed_rad_s +
                        gain_ * current_a.q / std::max(magnitude_wb_, kLeastDivisorWb));
@@ -21,7 +22,7 @@ PositionFluxObserver::PositionFluxObserver(const InductionMachineModel& machine,
       gain_(machine.flux_decay_per_s() * machine.mutual_inductance_h * period_s),
       pole_pairs_(machine.pole_pairs) {}
 
-void PositionFluxObserver::step(DirectQuadrature current_a) noexcept {
+void PositionFluxObserver::step(Dq current_a) noexcept {
   constexpr double kLeastDivisorWb = 1e-3;
   slip_angle_rad_ += gain_ * current_a.q / std::max(magnitude_wb_, kLeastDivisorWb);
   magnitude_wb_ += gain_ * current_a.d - decay_ * magnitude_wb_;

@@ -4,8 +4,8 @@
 #include <tuple>
 
 #include "clients/control/gains/gains.hpp"
-#include "clients/control/math/frames.hpp"
 #include "clients/models/induction_machine.hpp"
+#include "plant/math/frames.hpp"
 
 namespace drivebench::control {
 
@@ -23,7 +23,7 @@ class PolarFluxObserver {
 
   void start_at(double magnitude_wb) noexcept { magnitude_wb_ = magnitude_wb; }
   /// From this sample to the next one.
-  void step(DirectQuadrature current_a, double speed_rad_s) noexcept;
+  void step(Dq current_a, double speed_rad_s) noexcept;
 
  private:
   double decay_;           // η·T
@@ -45,7 +45,7 @@ class PositionFluxObserver {
   double angle_rad(double shaft_angle_rad) const noexcept {
     return pole_pairs_ * shaft_angle_rad + slip_angle_rad_;
   }
-  void step(DirectQuadrature current_a) noexcept;
+  void step(Dq current_a) noexcept;
 
  private:
   double decay_;  // η·T

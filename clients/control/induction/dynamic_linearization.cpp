@@ -181,10 +181,9 @@ Setpoint FlatInductionController::step(const Measurement& m, const Reference& r,
                               p_.position.proportional_per_s2 * angle_error_rad +
                               p_.position.derivative_per_s * (r.speed_rad_s - x.speed_rad_s);
   bool at_limit = false;
-  const DirectQuadrature reference_a = {
-      .d = clipped(flat.current_a.d, drive_.direct_reference_limit_a(), at_limit),
-      .q = clipped(motor_rad_s2 / (machine.acceleration_per_wb_a() * x.flux_divisor_wb()),
-                   drive_.quadrature_reference_limit_a, at_limit)};
+  const Dq reference_a = {.d = clipped(flat.current_a.d, drive_.direct_reference_limit_a(), at_limit),
+                          .q = clipped(motor_rad_s2 / (machine.acceleration_per_wb_a() * x.flux_divisor_wb()),
+                                       drive_.quadrature_reference_limit_a, at_limit)};
   const PhaseVoltages command = current_loop_.step(x, reference_a, {.d = 0.0, .q = flat.i_q_rate_a_s});
   tell({.angle_rad = x.angle_rad, .speed_rad_s = x.speed_rad_s, .saturated = command.saturated},
        {x.current_a.d, x.current_a.q, reference_a.d, reference_a.q, x.flux_wb, flat.flux_wb,

@@ -125,7 +125,7 @@ class QuadratureIntegratorController final : public Controller {
   LoadedInductionFeedback feedback_;
   FluxReference flux_reference_;
   DecoupledCurrentLoop current_loop_;
-  DirectQuadrature reference_a_{.d = 0.0, .q = 0.0};
+  Dq reference_a_{.d = 0.0, .q = 0.0};
 };
 
 struct FlatInductionParameters {
@@ -152,7 +152,7 @@ struct FlatInductionParameters {
 struct FlatInductionState {
   double flux_wb;
   double flux_rate_wb_s;
-  DirectQuadrature current_a;
+  Dq current_a;
   double i_q_rate_a_s;
 };
 FlatInductionState flat_induction(const InductionMachineModel& m, double slip_rad_s, double torque_nm,

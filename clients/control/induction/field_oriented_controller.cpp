@@ -9,6 +9,7 @@
 #include <string_view>
 
 #include "clients/control/math/pole_placement.hpp"
+#include "plant/math/unbounded.hpp"
 
 namespace drivebench::control {
 namespace {
@@ -86,8 +87,8 @@ Setpoint FieldOrientedController::step(const Measurement& m, const Reference& r,
       p_.speed_source == SpeedSource::kObserver ? out.speed_observer_rad_s : out.speed_difference_rad_s;
   out.flux_estimate_wb = flux_.magnitude_wb();
   out.flux_angle_estimate_rad = flux_.angle_rad();
-  const Direction flux = Direction::at(flux_.angle_rad());
-  const DirectQuadrature current_a = flux.to_dq({.a = m.i_a_a, .b = m.i_b_a});
+  const CosSin flux = cos_sin_unbounded(flux_.angle_rad());
+  const Dq current_a = to_dq({.a = m.i_a_a, .b = m.i_b_a}, flux);
   out.i_d_a = current_a.d;
   out.i_q_a = current_a.q;
 

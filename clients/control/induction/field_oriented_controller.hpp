@@ -11,8 +11,8 @@
 #include "clients/control/loop/controller.hpp"
 #include "clients/control/loop/current_loop.hpp"
 #include "clients/control/loop/servo_loop.hpp"
-#include "clients/control/math/frames.hpp"
 #include "clients/models/induction_machine.hpp"
+#include "plant/math/frames.hpp"
 
 namespace drivebench::control {
 
@@ -152,8 +152,8 @@ class FieldOrientedController final : public Controller {
   double speed_integral_rad_ = 0.0;
   double flux_integral_wb_s_ = 0.0;
   // Of the last sample: what the observers are stepped with when the next one comes.
-  DirectQuadrature last_current_a_{.d = 0.0, .q = 0.0};
-  PhasePair last_voltage_v_{.a = 0.0, .b = 0.0};
+  Dq last_current_a_{.d = 0.0, .q = 0.0};
+  TwoPhase last_voltage_v_{.a = 0.0, .b = 0.0};
   double last_angle_rad_ = 0.0;
   double last_speed_rad_s_ = 0.0;
 };

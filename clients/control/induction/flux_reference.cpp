@@ -2,6 +2,7 @@
 
 #include <cmath>
 #include <utility>
+#include "plant/math/exponential.hpp"
 
 namespace drivebench::control {
 
@@ -37,7 +38,7 @@ FluxTarget FluxReference::optimum(const Reference& r, std::int64_t periods) noex
   const TorqueSign sign = braking ? TorqueSign::kGenerating : TorqueSign::kMotoring;
   const double i_d_a = std::sqrt(share) * optimum_->at(r.speed_rad_s, sign).i_d_a;
   if (started_) {
-    const double kept = std::exp(-machine_.flux_decay_per_s() * period_s_ * static_cast<double>(periods));
+    const double kept = exponential(-machine_.flux_decay_per_s() * period_s_ * static_cast<double>(periods));
     flux_wb_ = kept * flux_wb_ + (1.0 - kept) * machine_.mutual_inductance_h * last_i_d_a_;
   } else {
     started_ = true;

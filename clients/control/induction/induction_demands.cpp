@@ -1,6 +1,6 @@
 #include "clients/control/induction/induction_demands.hpp"
 
-#include <cmath>
+#include "plant/math/length.hpp"
 
 namespace drivebench::control {
 
@@ -17,11 +17,11 @@ std::array<Demand, 2> InductionDemands::at(const Reference& r, const FluxTarget&
   const double u_q_v = motor_.stator_resistance_ohm * i_q_a + leakage_ohm * i_d_a +
                        motor_.stator_share() * flux_speed_rad_s * flux.flux_wb;
   return {{{.quantity = "stator current",
-            .value = std::hypot(i_d_a, i_q_a),
+            .value = length(i_d_a, i_q_a),
             .limit = allowance_.current_a,
             .unit = "A"},
            {.quantity = "stator voltage",
-            .value = std::hypot(u_d_v, u_q_v),
+            .value = length(u_d_v, u_q_v),
             .limit = allowance_.voltage_v,
             .unit = "V"}}};
 }

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <numbers>
+#include "clients/control/math/wrapped.hpp"
+#include "plant/math/unbounded.hpp"
 
 namespace drivebench::control {
 
@@ -40,8 +42,8 @@ const InductionState& InductionFeedback::sample(const Measurement& m, std::int64
   state_.speed_rad_s = observer_.speed_rad_s();
   state_.flux_wb = observer_.flux_magnitude_wb();
   state_.flux_angle_rad = observer_.flux_angle_rad();
-  state_.flux = Direction::at(state_.flux_angle_rad);
-  state_.current_a = state_.flux.to_dq({.a = m.i_a_a, .b = m.i_b_a});
+  state_.flux = cos_sin_unbounded(state_.flux_angle_rad);
+  state_.current_a = to_dq({.a = m.i_a_a, .b = m.i_b_a}, state_.flux);
   return state_;
 }
 
@@ -72,8 +74,8 @@ const InductionState& LoadedInductionFeedback::sample(const Measurement& m, std:
   state_.speed_rad_s = motion_.speed_rad_s();
   state_.flux_wb = flux_.magnitude_wb();
   state_.flux_angle_rad = wrapped(flux_.angle_rad(state_.angle_rad));
-  state_.flux = Direction::at(state_.flux_angle_rad);
-  state_.current_a = state_.flux.to_dq({.a = m.i_a_a, .b = m.i_b_a});
+  state_.flux = cos_sin_unbounded(state_.flux_angle_rad);
+  state_.current_a = to_dq({.a = m.i_a_a, .b = m.i_b_a}, state_.flux);
   return state_;
 }
 
@@ -83,8 +85,7 @@ double clipped(double x, double limit, bool& at_limit) noexcept {
   return y;
 }
 
-DirectQuadrature decoupled_voltage_v(const InductionMotorModel& motor, const InductionState& x,
-                                     DirectQuadrature rate_a_s) noexcept {
+Dq decoupled_voltage_v(const InductionMotorModel& motor, const InductionState& x, Dq rate_a_s) noexcept {
   const InductionMachineModel& m = motor.machine;
   const double eta = m.flux_decay_per_s();
   const double gamma = motor.current_decay_per_s();
@@ -100,20 +101,19 @@ DirectQuadrature decoupled_voltage_v(const InductionMotorModel& motor, const Ind
 }
 
 PhaseVoltages held_voltage(const InductionDriveParameters& drive, const InductionState& x,
-                           DirectQuadrature voltage_v) noexcept {
+                           Dq voltage_v) noexcept {
   const double ahead_rad = 0.5 * drive.period_s() * drive.motor.machine.pole_pairs * x.speed_rad_s;
-  const PhasePair wanted_v = Direction::at(x.flux_angle_rad + ahead_rad).to_ab(voltage_v);
+  const TwoPhase wanted_v = to_ab(voltage_v, cos_sin_unbounded(x.flux_angle_rad + ahead_rad));
   bool saturated = false;
-  const PhasePair given_v = {.a = clipped(wanted_v.a, drive.voltage_limit_v, saturated),
-                             .b = clipped(wanted_v.b, drive.voltage_limit_v, saturated)};
+  const TwoPhase given_v = {.a = clipped(wanted_v.a, drive.voltage_limit_v, saturated),
+                            .b = clipped(wanted_v.b, drive.voltage_limit_v, saturated)};
   return {.voltage_v = given_v, .saturated = saturated};
 }
 
-PhaseVoltages DecoupledCurrentLoop::step(const InductionState& x, DirectQuadrature reference_a,
-                                         DirectQuadrature reference_rate_a_s) const noexcept {
-  const DirectQuadrature rate_a_s = {
-      .d = reference_rate_a_s.d + pole_per_s_ * (reference_a.d - x.current_a.d),
-      .q = reference_rate_a_s.q + pole_per_s_ * (reference_a.q - x.current_a.q)};
+PhaseVoltages DecoupledCurrentLoop::step(const InductionState& x, Dq reference_a,
+                                         Dq reference_rate_a_s) const noexcept {
+  const Dq rate_a_s = {.d = reference_rate_a_s.d + pole_per_s_ * (reference_a.d - x.current_a.d),
+                       .q = reference_rate_a_s.q + pole_per_s_ * (reference_a.q - x.current_a.q)};
   return held_voltage(drive_, x, decoupled_voltage_v(drive_.motor, x, rate_a_s));
 }
 

@@ -9,8 +9,8 @@
 #include "clients/control/gains/machine_gains.hpp"
 #include "clients/control/loop/controller.hpp"
 #include "clients/control/loop/current_loop.hpp"
-#include "clients/control/math/frames.hpp"
 #include "clients/models/induction_machine.hpp"
+#include "plant/math/frames.hpp"
 
 namespace drivebench::control {
 
@@ -47,8 +47,8 @@ struct InductionState {
   double speed_rad_s = 0.0;
   double flux_wb = 0.0;
   double flux_angle_rad = 0.0;
-  Direction flux{.cosine = 1.0, .sine = 0.0};
-  DirectQuadrature current_a{.d = 0.0, .q = 0.0};
+  CosSin flux{.cos = 1.0, .sin = 0.0};
+  Dq current_a{.d = 0.0, .q = 0.0};
 
   /// For divisions: an unmagnetised machine has no torque to reckon with.
   double flux_divisor_wb() const noexcept { return flux_wb > 1e-3 ? flux_wb : 1e-3; }
@@ -101,13 +101,13 @@ double clipped(double x, double limit, bool& at_limit) noexcept;
 ///   u_d = σ·L_S·(γ·i_d − η·β·ψ − n_p·ω·i_q − η·M·i_q²/ψ + di_d/dt)
 ///   u_q = σ·L_S·(γ·i_q + β·n_p·ω·ψ + n_p·ω·i_d + η·M·i_d·i_q/ψ + di_q/dt)
 /// Source: the book, (8.10), (8.11) (IMC-01), which practice does without, as the text says.
-DirectQuadrature decoupled_voltage_v(const InductionMotorModel& motor, const InductionState& x,
-                                     DirectQuadrature current_rate_a_s) noexcept;
+Dq decoupled_voltage_v(const InductionMotorModel& motor, const InductionState& x,
+                       Dq current_rate_a_s) noexcept;
 
 /// The phase voltages, each within the limit, turned half a period ahead since they are held while the flux
 /// moves on.
 PhaseVoltages held_voltage(const InductionDriveParameters& drive, const InductionState& x,
-                           DirectQuadrature voltage_v) noexcept;
+                           Dq voltage_v) noexcept;
 
 /// Currents of first order: di/dt = di_ref/dt + p·(i_ref − i) on both axes, by decoupled_voltage_v(). A law
 /// with an integrator before a current takes that current for its state, so the current must be there; PI
@@ -117,8 +117,7 @@ class DecoupledCurrentLoop {
   DecoupledCurrentLoop(const InductionDriveParameters& drive, double pole_per_s) noexcept
       : drive_(drive), pole_per_s_(pole_per_s) {}
 
-  PhaseVoltages step(const InductionState& x, DirectQuadrature reference_a,
-                     DirectQuadrature reference_rate_a_s) const noexcept;
+  PhaseVoltages step(const InductionState& x, Dq reference_a, Dq reference_rate_a_s) const noexcept;
 
  private:
   InductionDriveParameters drive_;

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "clients/control/math/polynomial.hpp"
+#include "plant/math/length.hpp"
 
 namespace drivebench::control {
 namespace {
@@ -54,8 +55,8 @@ double SteadyInductionModel::current_a_per_direct(double delta) const noexcept {
 
 double SteadyInductionModel::voltage_v_per_direct(double delta, double speed_rad_s) const noexcept {
   const double flux_speed_rad_s = pole_pairs * speed_rad_s + delta / rotor_time_s;
-  return stator_resistance_ohm * std::hypot(1.0 - leakage * stator_time_s * delta * flux_speed_rad_s,
-                                            delta + stator_time_s * flux_speed_rad_s);
+  return stator_resistance_ohm * length(1.0 - leakage * stator_time_s * delta * flux_speed_rad_s,
+                                        delta + stator_time_s * flux_speed_rad_s);
 }
 
 std::vector<double> voltage_extrema(const SteadyInductionModel& m, double speed_rad_s) {

@@ -39,7 +39,7 @@ Setpoint VoltageLinearizationController::step(const Measurement& m, const Refere
                      friction_per_s * r.acceleration_rad_s2;
 
   const double psi = x.flux_divisor_wb();
-  const DirectQuadrature voltage_v =
+  const Dq voltage_v =
       decoupled_voltage_v(drive_.motor, x,
                           {.d = flux_rate_wb_s / machine.mutual_inductance_h + w_d / flux_gain,
                            .q = -flux_rate_wb_s * x.current_a.q / psi + w_q / (mu * psi)});

@@ -1,12 +1,12 @@
 #pragma once
 
 #include "clients/control/gains/loop_gains.hpp"
-#include "clients/control/math/frames.hpp"
+#include "plant/math/frames.hpp"
 
 namespace drivebench::control {
 
 struct PhaseVoltages {
-  PhasePair voltage_v;
+  TwoPhase voltage_v;
   bool saturated;  ///< at least one phase stands at its limit
 };
 
@@ -19,15 +19,15 @@ class CurrentLoop {
   CurrentLoop(const CurrentGains& gains, double voltage_limit_v, double period_s) noexcept
       : gains_(gains), voltage_limit_v_(voltage_limit_v), period_s_(period_s) {}
 
-  PhaseVoltages step(DirectQuadrature error_a, const Direction& flux) noexcept;
+  PhaseVoltages step(Dq error_a, CosSin flux) noexcept;
 
-  DirectQuadrature integral_v() const noexcept { return integral_v_; }
+  Dq integral_v() const noexcept { return integral_v_; }
 
  private:
   CurrentGains gains_;
   double voltage_limit_v_;
   double period_s_;
-  DirectQuadrature integral_v_{.d = 0.0, .q = 0.0};
+  Dq integral_v_{.d = 0.0, .q = 0.0};
 };
 
 }  // namespace drivebench::control

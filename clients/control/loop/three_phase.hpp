@@ -3,19 +3,20 @@
 #include <algorithm>
 
 #include "clients/control/loop/controller.hpp"
-#include "clients/models/two_phase.hpp"
+#include "plant/math/frames.hpp"
 
 namespace drivebench::control {
 
 /// The stator currents of a sample in two-phase quantities, of a star or of a two-phase machine.
-inline PhasePair stator_currents(const Measurement& m, bool star) noexcept {
-  return star ? two_phase_of(m.i_a_a, m.i_b_a, m.i_c_a) : PhasePair{.a = m.i_a_a, .b = m.i_b_a};
+inline TwoPhase stator_currents(const Measurement& m, bool star) noexcept {
+  return star ? three_to_two({.a = m.i_a_a, .b = m.i_b_a, .c = m.i_c_a})
+              : TwoPhase{.a = m.i_a_a, .b = m.i_b_a};
 }
 
 /// A two-phase quantity at the terminals of a star or of a two-phase machine.
-inline Setpoint terminal_values(PhasePair x, bool star) noexcept {
+inline Setpoint terminal_values(TwoPhase x, bool star) noexcept {
   if (!star) return {.a = x.a, .b = x.b};
-  const auto [a, b, c] = three_phases_of(x);
+  const auto [a, b, c] = two_to_three(x);
   return {.a = a, .b = b, .c = c};
 }
 

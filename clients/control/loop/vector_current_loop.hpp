@@ -1,9 +1,8 @@
 #pragma once
 
-#include <cmath>
-
 #include "clients/control/gains/loop_gains.hpp"
-#include "clients/control/math/frames.hpp"
+#include "plant/math/frames.hpp"
+#include "plant/math/length.hpp"
 
 namespace drivebench::control {
 
@@ -15,11 +14,10 @@ class VectorCurrentLoop {
   VectorCurrentLoop(const CurrentGains& gains, double voltage_limit_v, double period_s) noexcept
       : gains_(gains), voltage_limit_v_(voltage_limit_v), period_s_(period_s) {}
 
-  DirectQuadrature voltage_v(DirectQuadrature error_a, DirectQuadrature feed_forward_v) noexcept {
-    const DirectQuadrature wanted{
-        .d = feed_forward_v.d + gains_.proportional_v_per_a * error_a.d + integral_v_.d,
-        .q = feed_forward_v.q + gains_.proportional_v_per_a * error_a.q + integral_v_.q};
-    const double length_v = std::hypot(wanted.d, wanted.q);
+  Dq voltage_v(Dq error_a, Dq feed_forward_v) noexcept {
+    const Dq wanted{.d = feed_forward_v.d + gains_.proportional_v_per_a * error_a.d + integral_v_.d,
+                    .q = feed_forward_v.q + gains_.proportional_v_per_a * error_a.q + integral_v_.q};
+    const double length_v = length(wanted.d, wanted.q);
     saturated_ = length_v > voltage_limit_v_;
     if (saturated_) {
       const double share = voltage_limit_v_ / length_v;
@@ -36,7 +34,7 @@ class VectorCurrentLoop {
   CurrentGains gains_;
   double voltage_limit_v_;
   double period_s_;
-  DirectQuadrature integral_v_{.d = 0.0, .q = 0.0};
+  Dq integral_v_{.d = 0.0, .q = 0.0};
   bool saturated_ = false;
 };
 

@@ -84,7 +84,7 @@ Matrix<N, C> solved(Matrix<N, N> a, Matrix<N, C> b) noexcept {
 
 /// e^a: the Taylor series of a/2^k, squared k times.
 template <std::size_t N>
-Matrix<N, N> exponential(const Matrix<N, N>& a) noexcept {
+Matrix<N, N> matrix_exponential(const Matrix<N, N>& a) noexcept {
   double norm = 0.0;
   for (const auto& row : a) {
     for (const double x : row)

@@ -1,5 +1,4 @@
 #include <array>
-#include <cmath>
 #include <memory>
 #include <numbers>
 #include <vector>
@@ -10,6 +9,7 @@
 #include "clients/control/synchronous/pm_references.hpp"
 #include "clients/control/synchronous/pm_speed_controller.hpp"
 #include "clients/control/synchronous/pm_voltage_controller.hpp"
+#include "plant/math/length.hpp"
 
 namespace drivebench::control {
 namespace {
@@ -74,17 +74,17 @@ constexpr MoveAllowance kMoveAllowance = {.voltage_v = 42.0, .current_a = 6.0};
 std::array<Demand, 2> reference_demands(const PmVoltageParameters& p, const MoveAllowance& allowed,
                                         const Reference& r) {
   const PmReferences ref = pm_references(p.machine, r);
-  return {Demand{"stator voltage", std::hypot(ref.voltage_v.d, ref.voltage_v.q), allowed.voltage_v, "V"},
-          Demand{"stator current", std::hypot(ref.current_a.d, ref.current_a.q), allowed.current_a, "A"}};
+  return {Demand{"stator voltage", length(ref.voltage_v.d, ref.voltage_v.q), allowed.voltage_v, "V"},
+          Demand{"stator current", length(ref.current_a.d, ref.current_a.q), allowed.current_a, "A"}};
 }
 
 /// The same of steady currents.
 std::array<Demand, 2> steady_demands(const PmCurrentParameters& p, const MoveAllowance& allowed,
                                      const Reference& r) {
-  DirectQuadrature i = pm_references(p.machine, r).current_a;
+  Dq i = pm_references(p.machine, r).current_a;
   i.d = direct_current_within_voltage_a(p.machine, p.voltage_limit_v, r.speed_rad_s, i.q);
   return {Demand{"stator voltage", steady_voltage_v(p.machine, r.speed_rad_s, i), allowed.voltage_v, "V"},
-          Demand{"stator current", std::hypot(i.d, i.q), allowed.current_a, "A"}};
+          Demand{"stator current", length(i.d, i.q), allowed.current_a, "A"}};
 }
 
 constexpr RunTiming kTiming = {.sample_rate_hz = 10e3, .prepare_s = 0.002, .hold_s = 0.020};

@@ -1,11 +1,11 @@
 #include <array>
-#include <cmath>
 #include <memory>
 #include <numbers>
 #include <vector>
 
 #include "clients/control/presets/presets_families.hpp"
 #include "clients/control/salient/salient_pm_controller.hpp"
+#include "plant/math/length.hpp"
 
 namespace drivebench::control {
 namespace {
@@ -48,10 +48,9 @@ constexpr MoveAllowance kLimits = {.voltage_v = kVoltage_v, .current_a = 20.0};
 std::array<Demand, 2> salient_demands(const SalientPmParameters& p, const MoveAllowance& allowed,
                                       const Reference& r) {
   const SalientReferences x = salient_references(p, r);
-  const DirectQuadrature u = salient_voltage_v(p.machine, x, r.speed_rad_s);
-  return {
-      Demand{"stator voltage", std::hypot(u.d, u.q), allowed.voltage_v, "V"},
-      Demand{"stator current", std::hypot(x.least.current_a.d, x.least.current_a.q), allowed.current_a, "A"}};
+  const Dq u = salient_voltage_v(p.machine, x, r.speed_rad_s);
+  return {Demand{"stator voltage", length(u.d, u.q), allowed.voltage_v, "V"},
+          Demand{"stator current", length(x.least.current_a.d, x.least.current_a.q), allowed.current_a, "A"}};
 }
 
 Run run(const SalientPmParameters& p, const TrajectoryParameters& path, const MoveAllowance& allowed,

@@ -6,6 +6,7 @@
 
 #include "clients/control/presets/presets_families.hpp"
 #include "clients/control/synchronous/wound_rotor_controller.hpp"
+#include "plant/math/length.hpp"
 
 namespace drivebench::control {
 namespace {
@@ -54,8 +55,8 @@ std::array<Demand, 2> demands(const WoundRotorParameters& p, const MoveAllowance
                        (m.pole_pairs * m.mutual_inductance_h * field_a);
   const double omega_rad_s = m.pole_pairs * r.speed_rad_s;
   return {Demand{"stator voltage",
-                 std::hypot(omega_rad_s * m.stator_inductance_h * i_q_a,
-                            m.stator_resistance_ohm * i_q_a + omega_rad_s * m.mutual_inductance_h * field_a),
+                 length(omega_rad_s * m.stator_inductance_h * i_q_a,
+                        m.stator_resistance_ohm * i_q_a + omega_rad_s * m.mutual_inductance_h * field_a),
                  allowed.voltage_v, "V"},
           Demand{"stator current", i_q_a, allowed.current_a, "A"}};
 }

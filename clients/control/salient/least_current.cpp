@@ -1,6 +1,7 @@
 #include "clients/control/salient/least_current.hpp"
 
 #include <cmath>
+#include "plant/math/length.hpp"
 
 namespace drivebench::control {
 
@@ -14,7 +15,7 @@ LeastCurrent least_current(const SalientPmModel& m, double torque_nm) noexcept {
   double root_wb = lambda_wb;
   double slope_nm_per_a = m.torque_constant_nm_per_a;
   for (int k = 0; k < kMostSteps; ++k) {
-    root_wb = std::hypot(lambda_wb, 2.0 * delta_h * i_q_a);
+    root_wb = length(lambda_wb, 2.0 * delta_h * i_q_a);
     const double half_wb = 0.5 * (lambda_wb + root_wb);
     slope_nm_per_a = m.pole_pairs * (half_wb + 2.0 * delta_h * delta_h * i_q_a * i_q_a / root_wb);
     const double excess_nm = m.pole_pairs * half_wb * i_q_a - wanted_nm;

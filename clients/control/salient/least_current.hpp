@@ -1,7 +1,7 @@
 #pragma once
 
-#include "clients/control/math/frames.hpp"
 #include "clients/models/salient_pm_machine.hpp"
+#include "plant/math/frames.hpp"
 
 namespace drivebench::control {
 
@@ -10,8 +10,8 @@ namespace drivebench::control {
 /// so that i_d = 2·δ·i_q²/(λ + S) and the torque is n_p·i_q·(λ + S)/2, S = √(λ² + 4·δ²·i_q²). Without a
 /// saliency i_d = 0.
 struct LeastCurrent {
-  DirectQuadrature current_a;
-  DirectQuadrature slope_a_per_nm;  ///< of both over the torque
+  Dq current_a;
+  Dq slope_a_per_nm;  ///< of both over the torque
 };
 
 /// The shortest current that gives this torque. K_m must be positive.

@@ -1,16 +1,16 @@
 #include "clients/control/salient/salient_pm_controller.hpp"
 
 #include <algorithm>
-#include <cmath>
 
 #include "clients/control/loop/three_phase.hpp"
+#include "plant/math/length.hpp"
+#include "plant/math/unbounded.hpp"
 
 namespace drivebench::control {
 namespace {
 
 /// The voltages that make the currents change at these rates.
-DirectQuadrature voltage_for(const SalientPmModel& m, DirectQuadrature i, DirectQuadrature rate_a_s,
-                             double speed_rad_s) noexcept {
+Dq voltage_for(const SalientPmModel& m, Dq i, Dq rate_a_s, double speed_rad_s) noexcept {
   const double electrical_rad_s = m.pole_pairs * speed_rad_s;
   return {
       .d = m.resistance_ohm * i.d - electrical_rad_s * m.inductance_q_h * i.q + m.inductance_d_h * rate_a_s.d,
@@ -46,8 +46,7 @@ SalientReferences salient_references(const SalientPmParameters& p, const Referen
           .least = current_for(p, torque_nm)};
 }
 
-DirectQuadrature salient_voltage_v(const SalientPmModel& m, const SalientReferences& x,
-                                   double speed_rad_s) noexcept {
+Dq salient_voltage_v(const SalientPmModel& m, const SalientReferences& x, double speed_rad_s) noexcept {
   return voltage_for(
       m, x.least.current_a,
       {.d = x.torque_nm_per_s * x.least.slope_a_per_nm.d, .q = x.torque_nm_per_s * x.least.slope_a_per_nm.q},
@@ -62,11 +61,10 @@ SalientPmController::SalientPmController(const SalientPmParameters& p) noexcept
       shaft_(p.counts_per_revolution, p.speed_observer, p.machine.friction_rate_per_s(), p.period_s()),
       position_(p.position, p.period_s()) {}
 
-DirectQuadrature SalientPmController::wanted_voltage_v(DirectQuadrature i, double torque_nm,
-                                                       const SalientReferences& to) const noexcept {
+Dq SalientPmController::wanted_voltage_v(Dq i, double torque_nm, const SalientReferences& to) const noexcept {
   const SalientPmModel& m = p_.machine;
   const double pole = p_.torque_pole_per_s;
-  const DirectQuadrature ref = to.least.current_a;
+  const Dq ref = to.least.current_a;
   const double i_d_rate_a_s = to.torque_nm_per_s * to.least.slope_a_per_nm.d + pole * (ref.d - i.d);
   const double torque_rate_nm_s = to.torque_nm_per_s + pole * (to.torque_nm - torque_nm);
   // On the curve λ + δ·i_d is at least λ; a current far off it must not turn the sign.
@@ -80,7 +78,7 @@ Setpoint SalientPmController::step(const Measurement& m, const Reference& r, std
   const SalientPmModel& machine = p_.machine;
   shaft_.measure(m.encoder_count, periods, last_torque_nm_ / machine.inertia_kgm2);
   const double magnet_rad = machine.pole_pairs * shaft_.disc_rad();
-  const DirectQuadrature i = Direction::at(magnet_rad).to_dq(stator_currents(m, machine.star));
+  const Dq i = to_dq(stator_currents(m, machine.star), cos_sin_unbounded(magnet_rad));
   last_torque_nm_ = machine.torque_nm(i.d, i.q);
 
   SalientReferences to = salient_references(p_, r);
@@ -90,8 +88,8 @@ Setpoint SalientPmController::step(const Measurement& m, const Reference& r, std
   to.torque_nm = std::clamp(wanted_nm, -most_torque_nm_, most_torque_nm_);
   to.least = current_for(p_, to.torque_nm);
 
-  DirectQuadrature u = wanted_voltage_v(i, last_torque_nm_, to);
-  const double length_v = std::hypot(u.d, u.q);
+  Dq u = wanted_voltage_v(i, last_torque_nm_, to);
+  const double length_v = length(u.d, u.q);
   const bool short_of_voltage = length_v > p_.voltage_limit_v;
   if (short_of_voltage) {
     const double share = p_.voltage_limit_v / length_v;
@@ -103,7 +101,7 @@ Setpoint SalientPmController::step(const Measurement& m, const Reference& r, std
   tell({.angle_rad = shaft_.angle_rad(), .speed_rad_s = shaft_.speed_rad_s(), .saturated = saturated},
        {i.d, i.q, to.least.current_a.d, to.least.current_a.q, last_torque_nm_, to.torque_nm, u.d, u.q});
   const double lead_rad = 0.5 * p_.period_s() * machine.pole_pairs * shaft_.speed_rad_s();
-  return terminal_values(Direction::at(magnet_rad + lead_rad).to_ab(u), machine.star);
+  return terminal_values(to_ab(u, cos_sin_unbounded(magnet_rad + lead_rad)), machine.star);
 }
 
 }  // namespace drivebench::control

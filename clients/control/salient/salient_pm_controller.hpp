@@ -55,8 +55,7 @@ struct SalientReferences {
 /// τ = J·α + f·ω of a point of the trajectory, and its currents.
 SalientReferences salient_references(const SalientPmParameters& p, const Reference& r) noexcept;
 /// The voltages of those currents, with both slopes.
-DirectQuadrature salient_voltage_v(const SalientPmModel& m, const SalientReferences& x,
-                                   double speed_rad_s) noexcept;
+Dq salient_voltage_v(const SalientPmModel& m, const SalientReferences& x, double speed_rad_s) noexcept;
 
 /// Position control of a salient PM machine by input-output linearisation of torque and direct current:
 ///   τ_ref = J·(α_ref + K0·∫e + K1·e + K2·(ω_ref − ω̂)) + f·ω_ref        e = θ_ref − θ
@@ -75,8 +74,7 @@ class SalientPmController final : public Controller {
  private:
   Setpoint step(const Measurement& m, const Reference& r, std::int64_t periods) noexcept override;
   /// The voltages that bring currents and torque towards the reference.
-  DirectQuadrature wanted_voltage_v(DirectQuadrature i, double torque_nm,
-                                    const SalientReferences& to) const noexcept;
+  Dq wanted_voltage_v(Dq i, double torque_nm, const SalientReferences& to) const noexcept;
 
   SalientPmParameters p_;
   double most_torque_nm_;

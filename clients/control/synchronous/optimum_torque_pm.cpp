@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <stdexcept>
+#include "plant/math/length.hpp"
 
 namespace drivebench::control {
 namespace {
@@ -21,17 +22,16 @@ struct SteadyPm {
   double impedance2() const noexcept {
     return resistance_ohm * resistance_ohm + reactance_ohm * reactance_ohm;
   }
-  double voltage_v(DirectQuadrature i) const noexcept {
-    return std::hypot(resistance_ohm * i.d - reactance_ohm * i.q,
-                      resistance_ohm * i.q + reactance_ohm * i.d + emf_v);
+  double voltage_v(Dq i) const noexcept {
+    return length(resistance_ohm * i.d - reactance_ohm * i.q,
+                  resistance_ohm * i.q + reactance_ohm * i.d + emf_v);
   }
 };
 
 /// The point at which |i| = I and |u| = V meet, of two the one with the larger sign·i_q. There
 ///   V² = Z²·I² + E² + 2·E·(R·i_q + X·i_d)
 /// so both points lie on a line across the direction (X, R).
-std::optional<DirectQuadrature> meeting_point(const SteadyPm& m, const PmLimits& limits,
-                                              double sign) noexcept {
+std::optional<Dq> meeting_point(const SteadyPm& m, const PmLimits& limits, double sign) noexcept {
   const double length = std::sqrt(m.impedance2());
   const double i = limits.current_a;
   const double along_a = (limits.voltage_v * limits.voltage_v - m.impedance2() * i * i - m.emf_v * m.emf_v) /
@@ -40,24 +40,21 @@ std::optional<DirectQuadrature> meeting_point(const SteadyPm& m, const PmLimits&
   const double across_a = std::sqrt(i * i - along_a * along_a);
   const double cosine = m.reactance_ohm / length;
   const double sine = m.resistance_ohm / length;
-  return DirectQuadrature{.d = along_a * cosine - sign * across_a * sine,
-                          .q = along_a * sine + sign * across_a * cosine};
+  return Dq{.d = along_a * cosine - sign * across_a * sine, .q = along_a * sine + sign * across_a * cosine};
 }
 
 std::optional<PmOptimum> optimum_at_positive_speed(const PmMachineModel& p, const PmLimits& limits,
                                                    double speed_rad_s, double sign) noexcept {
   const SteadyPm m(p, speed_rad_s);
-  const auto at = [&p](DirectQuadrature i, LimitInForce limit) {
+  const auto at = [&p](Dq i, LimitInForce limit) {
     return PmOptimum{.torque_nm = p.torque_constant_nm_per_a * i.q, .current_a = i, .limit = limit};
   };
-  const DirectQuadrature by_current{.d = 0.0, .q = sign * limits.current_a};
+  const Dq by_current{.d = 0.0, .q = sign * limits.current_a};
   if (m.voltage_v(by_current) <= limits.voltage_v) return at(by_current, LimitInForce::kCurrent);
   const double z2 = m.impedance2();
-  const DirectQuadrature by_voltage{
-      .d = -m.reactance_ohm * m.emf_v / z2,
-      .q = (sign * limits.voltage_v * std::sqrt(z2) - m.emf_v * m.resistance_ohm) / z2};
-  if (std::hypot(by_voltage.d, by_voltage.q) <= limits.current_a)
-    return at(by_voltage, LimitInForce::kVoltage);
+  const Dq by_voltage{.d = -m.reactance_ohm * m.emf_v / z2,
+                      .q = (sign * limits.voltage_v * std::sqrt(z2) - m.emf_v * m.resistance_ohm) / z2};
+  if (length(by_voltage.d, by_voltage.q) <= limits.current_a) return at(by_voltage, LimitInForce::kVoltage);
   const auto both = meeting_point(m, limits, sign);
   if (!both) return std::nullopt;
   return at(*both, LimitInForce::kBoth);
@@ -78,7 +75,7 @@ std::optional<PmOptimum> optimum_torque(const PmMachineModel& p, const PmLimits&
   return result;
 }
 
-double steady_voltage_v(const PmMachineModel& p, double speed_rad_s, DirectQuadrature i) noexcept {
+double steady_voltage_v(const PmMachineModel& p, double speed_rad_s, Dq i) noexcept {
   return SteadyPm(p, speed_rad_s).voltage_v(i);
 }
 
@@ -109,7 +106,7 @@ PmTorqueTable::PmTorqueTable(const PmMachineModel& p, const PmLimits& limits, do
   }
 }
 
-DirectQuadrature PmTorqueTable::current_a(double speed_rad_s, double direction) const noexcept {
+Dq PmTorqueTable::current_a(double speed_rad_s, double direction) const noexcept {
   const double position =
       std::min(std::abs(speed_rad_s) * rows_per_rad_s_, static_cast<double>(rows_.size() - 1));
   const auto below = std::min(static_cast<std::size_t>(position), rows_.size() - 2);
@@ -117,8 +114,8 @@ DirectQuadrature PmTorqueTable::current_a(double speed_rad_s, double direction) 
   const bool motoring = (direction < 0.0) == (speed_rad_s < 0.0);
   const Row& low = rows_[below];
   const Row& high = rows_[below + 1];
-  const DirectQuadrature from = motoring ? low.motoring_a : low.braking_a;
-  const DirectQuadrature to = motoring ? high.motoring_a : high.braking_a;
+  const Dq from = motoring ? low.motoring_a : low.braking_a;
+  const Dq to = motoring ? high.motoring_a : high.braking_a;
   const double sign = speed_rad_s < 0.0 ? -1.0 : 1.0;
   return {.d = from.d + share * (to.d - from.d), .q = sign * (from.q + share * (to.q - from.q))};
 }

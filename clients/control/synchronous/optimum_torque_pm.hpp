@@ -3,8 +3,8 @@
 #include <optional>
 #include <vector>
 
-#include "clients/control/math/frames.hpp"
 #include "clients/models/pm_machine.hpp"
+#include "plant/math/frames.hpp"
 
 namespace drivebench::control {
 
@@ -19,7 +19,7 @@ enum class LimitInForce { kCurrent, kBoth, kVoltage };
 
 struct PmOptimum {
   double torque_nm;
-  DirectQuadrature current_a;
+  Dq current_a;
   LimitInForce limit;
 };
 
@@ -34,7 +34,7 @@ std::optional<PmOptimum> optimum_torque(const PmMachineModel& p, const PmLimits&
                                         double direction) noexcept;
 
 /// |u| of a machine turning steadily with these currents.
-double steady_voltage_v(const PmMachineModel& p, double speed_rad_s, DirectQuadrature i) noexcept;
+double steady_voltage_v(const PmMachineModel& p, double speed_rad_s, Dq i) noexcept;
 
 /// The direct current closest to zero that keeps the voltage within its limit while i_q flows; the one of
 /// least voltage where none does.
@@ -49,12 +49,12 @@ class PmTorqueTable {
   PmTorqueTable(const PmMachineModel& p, const PmLimits& limits, double max_speed_rad_s, int points);
 
   /// Beyond the largest speed: what holds there.
-  DirectQuadrature current_a(double speed_rad_s, double direction) const noexcept;
+  Dq current_a(double speed_rad_s, double direction) const noexcept;
 
  private:
   struct Row {
-    DirectQuadrature motoring_a;
-    DirectQuadrature braking_a;
+    Dq motoring_a;
+    Dq braking_a;
   };
   double rows_per_rad_s_;
   std::vector<Row> rows_;

@@ -5,6 +5,7 @@
 
 #include "clients/control/loop/three_phase.hpp"
 #include "clients/control/synchronous/optimum_torque_pm.hpp"
+#include "plant/math/unbounded.hpp"
 
 namespace drivebench::control {
 
@@ -17,7 +18,7 @@ PmCurrentController::PmCurrentController(const PmCurrentParameters& p) noexcept
 Setpoint PmCurrentController::step(const Measurement& m, const Reference& r, std::int64_t periods) noexcept {
   shaft_.measure(m.encoder_count, periods, p_.machine.acceleration_per_a() * last_i_q_a_);
   const double magnet_rad = p_.machine.pole_pairs * shaft_.disc_rad();
-  const DirectQuadrature i = Direction::at(magnet_rad).to_dq(stator_currents(m, p_.machine.star));
+  const Dq i = to_dq(stator_currents(m, p_.machine.star), cos_sin_unbounded(magnet_rad));
   last_i_q_a_ = i.q;
 
   const double acceleration = position_.acceleration_rad_s2(r, shaft_.angle_rad(), shaft_.speed_rad_s());
@@ -35,7 +36,7 @@ Setpoint PmCurrentController::step(const Measurement& m, const Reference& r, std
        {i.d, i.q, i_d_a, i_q_a});
   const double lead_rad =
       p_.angle_lead_samples * p_.period_s() * p_.machine.pole_pairs * shaft_.speed_rad_s();
-  return terminal_values(Direction::at(magnet_rad + lead_rad).to_ab({.d = i_d_a, .q = i_q_a}),
+  return terminal_values(to_ab({.d = i_d_a, .q = i_q_a}, cos_sin_unbounded(magnet_rad + lead_rad)),
                          p_.machine.star);
 }
 

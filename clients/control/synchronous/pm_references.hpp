@@ -1,16 +1,16 @@
 #pragma once
 
-#include "clients/control/math/frames.hpp"
 #include "clients/control/moves/trajectory.hpp"
 #include "clients/models/pm_machine.hpp"
+#include "plant/math/frames.hpp"
 
 namespace drivebench::control {
 
 /// Currents and voltages of a PM machine that follows a trajectory without error.
 struct PmReferences {
-  DirectQuadrature current_a;
-  DirectQuadrature slope_a_per_s;  ///< of the currents
-  DirectQuadrature voltage_v;
+  Dq current_a;
+  Dq slope_a_per_s;  ///< of the currents
+  Dq voltage_v;
 };
 
 /// The direct current that takes the least voltage at this speed, whatever the torque (optimal lead angle):

@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "clients/control/loop/three_phase.hpp"
+#include "plant/math/unbounded.hpp"
 
 namespace drivebench::control {
 namespace {
@@ -23,12 +24,12 @@ Setpoint PmSpeedController::step(const Measurement& m, const Reference& r, std::
   shaft_.measure(m.encoder_count, periods, p_.machine.acceleration_per_a() * last_i_q_a_);
   const double omega_rad_s = p_.machine.pole_pairs * shaft_.speed_rad_s();
   const double magnet_rad = p_.machine.pole_pairs * shaft_.disc_rad();
-  const DirectQuadrature i = Direction::at(magnet_rad).to_dq(stator_currents(m, p_.machine.star));
+  const Dq i = to_dq(stator_currents(m, p_.machine.star), cos_sin_unbounded(magnet_rad));
   last_i_q_a_ = i.q;
 
-  const DirectQuadrature wanted = wanted_current_a(r);
+  const Dq wanted = wanted_current_a(r);
   const double l = p_.machine.inductance_h;
-  const DirectQuadrature u = current_loop_.voltage_v(
+  const Dq u = current_loop_.voltage_v(
       {.d = wanted.d - i.d, .q = wanted.q - i.q},
       {.d = -omega_rad_s * l * i.q,
        .q = omega_rad_s * l * i.d + p_.machine.torque_constant_nm_per_a * shaft_.speed_rad_s()});
@@ -37,15 +38,15 @@ Setpoint PmSpeedController::step(const Measurement& m, const Reference& r, std::
         .saturated = current_loop_.saturated()},
        {i.d, i.q, wanted.d, wanted.q, u.d, u.q});
   const double lead_rad = p_.angle_lead_samples * p_.period_s() * omega_rad_s;
-  return terminal_values(Direction::at(magnet_rad + lead_rad).to_ab(u), p_.machine.star);
+  return terminal_values(to_ab(u, cos_sin_unbounded(magnet_rad + lead_rad)), p_.machine.star);
 }
 
-DirectQuadrature PmSpeedController::wanted_current_a(const Reference& r) const noexcept {
+Dq PmSpeedController::wanted_current_a(const Reference& r) const noexcept {
   const double speed_rad_s = shaft_.speed_rad_s();
   const double acceleration = r.acceleration_rad_s2 + p_.speed_gain_per_s * (r.speed_rad_s - speed_rad_s);
   const double i_q_a = (p_.machine.inertia_kgm2 * acceleration + p_.machine.friction_nms * speed_rad_s) /
                        p_.machine.torque_constant_nm_per_a;
-  const DirectQuadrature most = table_.current_a(speed_rad_s, i_q_a);
+  const Dq most = table_.current_a(speed_rad_s, i_q_a);
   if (std::abs(i_q_a) >= std::abs(most.q)) return most;
   return {.d = direct_current_within_voltage_a(p_.machine, p_.voltage_limit_v, speed_rad_s, i_q_a),
           .q = i_q_a};

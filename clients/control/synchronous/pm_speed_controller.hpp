@@ -57,7 +57,7 @@ class PmSpeedController final : public Controller {
 
  private:
   Setpoint step(const Measurement& m, const Reference& r, std::int64_t periods) noexcept override;
-  DirectQuadrature wanted_current_a(const Reference& r) const noexcept;
+  Dq wanted_current_a(const Reference& r) const noexcept;
 
   PmSpeedParameters p_;
   ShaftSensing shaft_;

@@ -2,6 +2,7 @@
 
 #include "clients/control/loop/three_phase.hpp"
 #include "clients/control/synchronous/pm_references.hpp"
+#include "plant/math/unbounded.hpp"
 
 namespace drivebench::control {
 
@@ -14,12 +15,13 @@ PmVoltageController::PmVoltageController(const PmVoltageParameters& p) noexcept
 Setpoint PmVoltageController::step(const Measurement& m, const Reference& r, std::int64_t periods) noexcept {
   shaft_.measure(m.encoder_count, periods, p_.machine.acceleration_per_a() * last_i_q_a_);
   const double magnet_rad = p_.machine.pole_pairs * shaft_.disc_rad();
-  const DirectQuadrature i = Direction::at(magnet_rad).to_dq(stator_currents(m, p_.machine.star));
+  const Dq i = to_dq(stator_currents(m, p_.machine.star), cos_sin_unbounded(magnet_rad));
   const PmReferences ref = pm_references(p_.machine, r);
-  const DirectQuadrature u = wanted_voltage_v(r, ref, i);
+  const Dq u = wanted_voltage_v(r, ref, i);
   const double lead_rad =
       p_.angle_lead_samples * p_.period_s() * p_.machine.pole_pairs * shaft_.speed_rad_s();
-  const Setpoint wanted = terminal_values(Direction::at(magnet_rad + lead_rad).to_ab(u), p_.machine.star);
+  const Setpoint wanted =
+      terminal_values(to_ab(u, cos_sin_unbounded(magnet_rad + lead_rad)), p_.machine.star);
   const Setpoint given = clipped(wanted, p_.voltage_limit_v);
   const bool saturated = !same_phases(wanted, given);
   if (!saturated) angle_integral_rad_s_ += p_.period_s() * (shaft_.angle_rad() - r.angle_rad);
@@ -29,8 +31,7 @@ Setpoint PmVoltageController::step(const Measurement& m, const Reference& r, std
   return given;
 }
 
-DirectQuadrature PmVoltageController::wanted_voltage_v(const Reference& r, const PmReferences& ref,
-                                                       DirectQuadrature i) const noexcept {
+Dq PmVoltageController::wanted_voltage_v(const Reference& r, const PmReferences& ref, Dq i) const noexcept {
   const PmFeedbackGains& k = p_.feedback;
   const double speed_rad_s = shaft_.speed_rad_s();
   const double l = p_.machine.inductance_h;

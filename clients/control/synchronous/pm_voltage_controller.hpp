@@ -8,9 +8,9 @@
 #include "clients/control/estimators/shaft_sensing.hpp"
 #include "clients/control/gains/machine_gains.hpp"
 #include "clients/control/loop/controller.hpp"
-#include "clients/control/math/frames.hpp"
 #include "clients/control/synchronous/pm_references.hpp"
 #include "clients/models/pm_machine.hpp"
+#include "plant/math/frames.hpp"
 
 namespace drivebench::control {
 
@@ -70,8 +70,7 @@ class PmVoltageController final : public Controller {
 
  private:
   Setpoint step(const Measurement& m, const Reference& r, std::int64_t periods) noexcept override;
-  DirectQuadrature wanted_voltage_v(const Reference& r, const PmReferences& ref,
-                                    DirectQuadrature i) const noexcept;
+  Dq wanted_voltage_v(const Reference& r, const PmReferences& ref, Dq i) const noexcept;
 
   PmVoltageParameters p_;
   ShaftSensing shaft_;

@@ -3,6 +3,7 @@
 #include <array>
 #include <cmath>
 #include <numbers>
+#include "plant/math/unbounded.hpp"
 
 namespace drivebench::control {
 namespace {
@@ -16,13 +17,14 @@ double StepperParameters::step_rad() const noexcept {
   return kQuarterTurn_rad / (pole_pairs * in_a_full_step);
 }
 
-PhasePair step_pattern(StepMode mode, double microsteps, double electrical_rad) noexcept {
+TwoPhase step_pattern(StepMode mode, double microsteps, double electrical_rad) noexcept {
   if (mode == StepMode::kMicro) {
     const double step_rad = kQuarterTurn_rad / microsteps;
     const double angle_rad = step_rad * std::round(electrical_rad / step_rad);
-    return {.a = std::cos(angle_rad), .b = std::sin(angle_rad)};
+    const CosSin at = cos_sin_unbounded(angle_rad);
+    return {.a = at.cos, .b = at.sin};
   }
-  constexpr std::array<PhasePair, 8> kHalfSteps{
+  constexpr std::array<TwoPhase, 8> kHalfSteps{
       {{1, 0}, {1, 1}, {0, 1}, {-1, 1}, {-1, 0}, {-1, -1}, {0, -1}, {1, -1}}};
   const int stride = mode == StepMode::kFull ? 2 : 1;
   const double nearest = std::round(electrical_rad / (0.5 * kQuarterTurn_rad * stride)) * stride;
@@ -45,7 +47,7 @@ Setpoint StepperController::step(const Measurement& m, const Reference& r, std::
   }
   const double angle_rad = rad_per_count * static_cast<double>(m.encoder_count - start_count_);
   const double speed_rad_s = difference_.step(m.encoder_count, periods);
-  const PhasePair on =
+  const TwoPhase on =
       step_pattern(p_.mode, p_.microsteps, start_electrical_rad_ + p_.pole_pairs * r.angle_rad);
   tell({.angle_rad = angle_rad, .speed_rad_s = speed_rad_s, .saturated = false},
        {p_.step_rad() * std::round(r.angle_rad / p_.step_rad())});

@@ -8,7 +8,7 @@
 #include "clients/control/estimators/observers.hpp"
 #include "clients/control/gains/gains.hpp"
 #include "clients/control/loop/controller.hpp"
-#include "clients/control/math/frames.hpp"
+#include "plant/math/frames.hpp"
 
 namespace drivebench::control {
 
@@ -42,7 +42,7 @@ struct StepperParameters {
 /// The phase values, for an amplitude of 1, at which the rotor of a stepping motor rests at an electrical
 /// angle; the angle is rounded to the nearest step. Source: the book, 9.4 and problem 9.10 (ST-01,
 /// ST-03).
-PhasePair step_pattern(StepMode mode, double microsteps, double electrical_rad) noexcept;
+TwoPhase step_pattern(StepMode mode, double microsteps, double electrical_rad) noexcept;
 
 /// A stepping motor without feedback: the phases are those at which the rotor rests at the angle of the
 /// reference, rounded to the nearest step. Angle 0 is the full step closest to where the rotor stands at the

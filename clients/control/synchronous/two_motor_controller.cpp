@@ -4,13 +4,14 @@
 #include <cmath>
 
 #include "clients/control/loop/three_phase.hpp"
-#include "clients/control/math/frames.hpp"
+#include "plant/math/frames.hpp"
+#include "plant/math/unbounded.hpp"
 
 namespace drivebench::control {
 namespace {
 
 /// Shortened to the limit, so that the direction stays.
-PhasePair shortened(PhasePair u, double limit_v) noexcept {
+TwoPhase shortened(TwoPhase u, double limit_v) noexcept {
   const double excess = std::max({std::abs(u.a) / limit_v, std::abs(u.b) / limit_v, 1.0});
   return {.a = u.a / excess, .b = u.b / excess};
 }
@@ -28,17 +29,17 @@ Reference FallBack::behind(const Reference& first) const noexcept {
               rate * first.acceleration_rad_s2 - way.jerk_rad_s3 * first.speed_rad_s * first.speed_rad_s};
 }
 
-PhasePair voltages_across(const std::array<double, 2>& angles_rad, const std::array<double, 2>& v_q_v,
-                          double damping) noexcept {
-  const std::array<Direction, 2> rotor{Direction::at(angles_rad[0]), Direction::at(angles_rad[1])};
+TwoPhase voltages_across(const std::array<double, 2>& angles_rad, const std::array<double, 2>& v_q_v,
+                         double damping) noexcept {
+  const std::array<CosSin, 2> rotor{cos_sin_unbounded(angles_rad[0]), cos_sin_unbounded(angles_rad[1])};
   // A·A' has ones on its diagonal and the cosine of the angle between the rotors beside it.
-  const double cross = rotor[0].cosine * rotor[1].cosine + rotor[0].sine * rotor[1].sine;
+  const double cross = rotor[0].cos * rotor[1].cos + rotor[0].sin * rotor[1].sin;
   const double diagonal = 1.0 + damping * damping;
   const double scale = std::max(diagonal * diagonal - cross * cross, 1e-12);
   const double first = (diagonal * v_q_v[0] - cross * v_q_v[1]) / scale;
   const double second = (diagonal * v_q_v[1] - cross * v_q_v[0]) / scale;
-  return {.a = -rotor[0].sine * first - rotor[1].sine * second,
-          .b = rotor[0].cosine * first + rotor[1].cosine * second};
+  return {.a = -rotor[0].sin * first - rotor[1].sin * second,
+          .b = rotor[0].cos * first + rotor[1].cos * second};
 }
 
 TwoMotorController::TwoMotorController(const TwoMotorParameters& p) noexcept
@@ -61,9 +62,9 @@ void TwoMotorController::Motor::measure(std::int64_t count, std::int64_t periods
   electrical_rad = machine.pole_pairs * shaft.disc_rad();
 }
 
-double TwoMotorController::wanted_v(Motor& motor, const Reference& r, PhasePair current_a) const noexcept {
+double TwoMotorController::wanted_v(Motor& motor, const Reference& r, TwoPhase current_a) const noexcept {
   const PmMachineModel& m = motor.machine;
-  const DirectQuadrature i = Direction::at(motor.electrical_rad).to_dq(current_a);
+  const Dq i = to_dq(current_a, cos_sin_unbounded(motor.electrical_rad));
   const double speed_rad_s = motor.shaft.speed_rad_s();
   motor.last_i_q_a = i.q;
   motor.error_rad = r.angle_rad - motor.turned_rad();
@@ -83,14 +84,14 @@ Setpoint TwoMotorController::step(const Measurement& m, const Reference& r, std:
     rest_samples_ -= periods;
     second_.start_rad = second_.shaft.angle_rad();
   }
-  const double determinant = std::sin(second_.electrical_rad - first_.electrical_rad);
+  const double determinant = cos_sin_unbounded(second_.electrical_rad - first_.electrical_rad).sin;
   const double near = std::max(1.0 - std::abs(determinant) / p_.near_determinant, 0.0);
   const std::array<double, 2> wanted{
       wanted_v(first_, r, {.a = m.i_a_a, .b = m.i_b_a}),
       wanted_v(second_, p_.fall_back.behind(r), {.a = m.second.i_a_a, .b = m.second.i_b_a})};
-  const PhasePair u =
+  const TwoPhase u =
       voltages_across({first_.electrical_rad, second_.electrical_rad}, wanted, p_.damping * near);
-  const PhasePair given = rests ? PhasePair{.a = 0.0, .b = 0.0} : shortened(u, p_.voltage_limit_v);
+  const TwoPhase given = rests ? TwoPhase{.a = 0.0, .b = 0.0} : shortened(u, p_.voltage_limit_v);
   const bool saturated = !rests && (given.a != u.a || given.b != u.b);
   if (!rests && near == 0.0) {
     first_.servo.integrate();

@@ -12,7 +12,7 @@
 #include "clients/control/loop/controller.hpp"
 #include "clients/control/loop/servo_loop.hpp"
 #include "clients/models/pm_machine.hpp"
-#include "clients/models/two_phase.hpp"
+#include "plant/math/frames.hpp"
 
 namespace drivebench::control {
 
@@ -70,8 +70,8 @@ struct TwoMotorParameters {
 /// The determinant is sin(θ_2 − θ_1); at 0 no u_a, u_b have two different components. `damping` δ gives the
 /// nearest ones, u = A'·(A·A' + δ²·I)⁻¹·v, which are the exact ones at 0. Source: the book, problem 9.9
 /// (ST-05).
-PhasePair voltages_across(const std::array<double, 2>& angles_rad, const std::array<double, 2>& v_q_v,
-                          double damping) noexcept;
+TwoPhase voltages_across(const std::array<double, 2>& angles_rad, const std::array<double, 2>& v_q_v,
+                         double damping) noexcept;
 
 /// Positions of two PM motors in parallel on one amplifier: both have its voltages, and each gets the one
 /// across its q axis. The d currents follow as they must; they give no torque, but heat. Each motor:
@@ -97,7 +97,7 @@ class TwoMotorController final : public Controller {
   };
 
   Setpoint step(const Measurement& m, const Reference& r, std::int64_t periods) noexcept override;
-  double wanted_v(Motor& motor, const Reference& r, PhasePair current_a) const noexcept;
+  double wanted_v(Motor& motor, const Reference& r, TwoPhase current_a) const noexcept;
   Motor motor_of(const PmMachineModel& machine) const noexcept;
 
   TwoMotorParameters p_;

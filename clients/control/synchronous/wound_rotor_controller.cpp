@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "clients/control/loop/three_phase.hpp"
+#include "plant/math/unbounded.hpp"
 
 namespace drivebench::control {
 
@@ -16,7 +17,7 @@ WoundRotorController::WoundRotorController(const WoundRotorParameters& p) noexce
 Setpoint WoundRotorController::step(const Measurement& m, const Reference& r, std::int64_t periods) noexcept {
   shaft_.measure(m.encoder_count, periods, last_torque_nm_ / p_.machine.inertia_kgm2);
   const double field_rad = p_.machine.pole_pairs * shaft_.disc_rad();
-  const Currents i{.stator = Direction::at(field_rad).to_dq(stator_currents(m, p_.machine.star)),
+  const Currents i{.stator = to_dq(stator_currents(m, p_.machine.star), cos_sin_unbounded(field_rad)),
                    .field = m.i_f_a};
   last_torque_nm_ = p_.machine.pole_pairs * p_.machine.mutual_inductance_h * i.field * i.stator.q;
 
@@ -35,7 +36,7 @@ Setpoint WoundRotorController::step(const Measurement& m, const Reference& r, st
        {i.stator.d, i.stator.q, wanted.stator.q, wanted.field, u.stator.d, u.stator.q});
   const double lead_rad =
       p_.angle_lead_samples * p_.period_s() * p_.machine.pole_pairs * shaft_.speed_rad_s();
-  Setpoint out = terminal_values(Direction::at(field_rad + lead_rad).to_ab(u.stator), p_.machine.star);
+  Setpoint out = terminal_values(to_ab(u.stator, cos_sin_unbounded(field_rad + lead_rad)), p_.machine.star);
   out.field = u.field;
   return out;
 }
@@ -72,11 +73,10 @@ WoundRotorController::Voltages WoundRotorController::voltages(const Currents& i,
   const double slope_field =
       (field_v - m.field_resistance_ohm * i.field - m.mutual_inductance_h * slope_d) / m.field_inductance_h;
   const double omega_rad_s = m.pole_pairs * shaft_.speed_rad_s();
-  const DirectQuadrature u{
-      .d = m.stator_resistance_ohm * i.stator.d + m.stator_inductance_h * slope_d +
-           m.mutual_inductance_h * slope_field - omega_rad_s * m.stator_inductance_h * i.stator.q,
-      .q = m.stator_resistance_ohm * i.stator.q + m.stator_inductance_h * slope_q +
-           omega_rad_s * (m.stator_inductance_h * i.stator.d + m.mutual_inductance_h * i.field)};
+  const Dq u{.d = m.stator_resistance_ohm * i.stator.d + m.stator_inductance_h * slope_d +
+                  m.mutual_inductance_h * slope_field - omega_rad_s * m.stator_inductance_h * i.stator.q,
+             .q = m.stator_resistance_ohm * i.stator.q + m.stator_inductance_h * slope_q +
+                  omega_rad_s * (m.stator_inductance_h * i.stator.d + m.mutual_inductance_h * i.field)};
   const double limit_v = (m.star ? std::sqrt(1.5) : 1.0) * p_.voltage_limit_v;
   // The d axis first: torque can wait, but a d axis without control weakens or builds up the field.
   const double d_v = std::clamp(u.d, -limit_v, limit_v);

@@ -9,8 +9,8 @@
 #include "clients/control/gains/machine_gains.hpp"
 #include "clients/control/loop/controller.hpp"
 #include "clients/control/loop/servo_loop.hpp"
-#include "clients/control/math/frames.hpp"
 #include "clients/models/wound_rotor_machine.hpp"
+#include "plant/math/frames.hpp"
 
 namespace drivebench::control {
 
@@ -70,11 +70,11 @@ class WoundRotorController final : public Controller {
 
  private:
   struct Currents {
-    DirectQuadrature stator;
+    Dq stator;
     double field;
   };
   struct Voltages {
-    DirectQuadrature stator;
+    Dq stator;
     double field;
   };
   Setpoint step(const Measurement& m, const Reference& r, std::int64_t periods) noexcept override;

@@ -1,6 +1,7 @@
 #include "clients/control/wound_dc/series_dc_observer.hpp"
 
 #include <cmath>
+#include "plant/math/trig.hpp"
 
 namespace drivebench::control {
 
@@ -38,7 +39,7 @@ void SeriesDcObserver::update(double current_a, double voltage_v, std::int64_t p
     running_ = false;
     return;
   }
-  const double output = log_share_ * std::log(std::abs(model_.flux_wb(current_a)));
+  const double output = log_share_ * logarithm(std::abs(model_.flux_wb(current_a)));
   if (running_) {
     observer_.correct_last(inputs(last_current_a_, voltage_v));
   } else {

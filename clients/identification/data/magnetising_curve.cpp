@@ -3,6 +3,7 @@
 #include <Eigen/Dense>
 #include <cmath>
 #include <cstddef>
+#include "plant/math/exponential.hpp"
 
 namespace drivebench::identification {
 
@@ -47,8 +48,8 @@ SaturatedCircuit saturated_circuit(const Result& r) {
   const double stator_h = r.at("L_S");
   const double coupling = 1.0 - r.at("sigma");
   const double split = r.at("split");
-  const double rotor_h = stator_h * std::pow(coupling, split);
-  const double mutual_h = stator_h * std::pow(coupling, 0.5 * (1.0 + split));
+  const double rotor_h = stator_h * power(coupling, split);
+  const double mutual_h = stator_h * power(coupling, 0.5 * (1.0 + split));
   return {.rotor_resistance_ohm = rotor_h / r.at("T_R"),
           .stator_leakage_h = stator_h - mutual_h,
           .rotor_leakage_h = rotor_h - mutual_h,

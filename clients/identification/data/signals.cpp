@@ -6,7 +6,8 @@
 #include <numbers>
 #include <string>
 
-#include "clients/models/two_phase.hpp"
+#include "plant/math/frames.hpp"
+#include "plant/math/unbounded.hpp"
 
 namespace drivebench::identification {
 namespace {
@@ -105,7 +106,7 @@ bool begins_at_rest(std::span<const SeriesView> currents, SeriesView speed) noex
 TwoPhaseSeries two_phase(SeriesView a, SeriesView b, SeriesView c) {
   TwoPhaseSeries y = {.a = Series(a.size()), .b = Series(a.size())};
   for (std::size_t k = 0; k < a.size(); ++k) {
-    const PhasePair pair = two_phase_of(a[k], b[k], c[k]);
+    const TwoPhase pair = three_to_two({.a = a[k], .b = b[k], .c = c[k]});
     y.a[k] = pair.a;
     y.b[k] = pair.b;
   }
@@ -115,8 +116,7 @@ TwoPhaseSeries two_phase(SeriesView a, SeriesView b, SeriesView c) {
 TwoPhaseSeries rotated(const TwoPhaseSeries& x, SeriesView angle_rad) {
   TwoPhaseSeries y = {.a = Series(x.a.size()), .b = Series(x.a.size())};
   for (std::size_t k = 0; k < x.a.size(); ++k) {
-    const double cosine = std::cos(angle_rad[k]);
-    const double sine = std::sin(angle_rad[k]);
+    const auto [cosine, sine] = cos_sin_unbounded(angle_rad[k]);
     y.a[k] = cosine * x.a[k] + sine * x.b[k];
     y.b[k] = cosine * x.b[k] - sine * x.a[k];
   }

@@ -2,6 +2,7 @@
 
 #include <cmath>
 #include <complex>
+#include "plant/math/phasor.hpp"
 
 namespace drivebench::identification {
 
@@ -11,12 +12,12 @@ namespace drivebench::identification {
 class Direction {
  public:
   Direction() = default;
-  explicit Direction(double angle_rad) noexcept : angle_rad_(angle_rad), at_(std::polar(1.0, angle_rad)) {}
+  explicit Direction(double angle_rad) noexcept : angle_rad_(angle_rad), at_(phasor(angle_rad)) {}
 
   std::complex<double> of(double angle_rad) const noexcept {
     const double d = angle_rad - angle_rad_;
     constexpr double kNear_rad = 0.25;
-    if (!(std::abs(d) < kNear_rad)) return std::polar(1.0, angle_rad);
+    if (!(std::abs(d) < kNear_rad)) return phasor(angle_rad);
     const double d2 = d * d;
     const double sine =
         d *

@@ -1,11 +1,11 @@
 #include "clients/identification/math/filters.hpp"
 
 #include <algorithm>
-#include <cmath>
 #include <numbers>
 #include <numeric>
 #include <string>
 #include <utility>
+#include "plant/math/phasor.hpp"
 
 namespace drivebench::identification {
 namespace {
@@ -47,7 +47,7 @@ std::vector<std::complex<double>> butterworth_poles(int order) {
   check_order(order);
   std::vector<std::complex<double>> poles;
   for (int k = 1; k <= order; ++k)
-    poles.push_back(std::polar(1.0, kPi * (2.0 * k + order - 1.0) / (2.0 * order)));
+    poles.push_back(phasor(kPi * (2.0 * k + order - 1.0) / (2.0 * order)));
   return poles;
 }
 
@@ -64,8 +64,8 @@ std::vector<AnalogFilter> butterworth_sections(int order, double cutoff_rad_s) {
 }
 
 DigitalFilter bilinear(const AnalogFilter& filter, double period_s, double exact_rad_s) {
-  const double rate =
-      exact_rad_s > 0.0 ? exact_rad_s / std::tan(0.5 * exact_rad_s * period_s) : 2.0 / period_s;
+  const CosSin half_turn = cos_sin(0.5 * exact_rad_s * period_s);
+  const double rate = exact_rad_s > 0.0 ? exact_rad_s * half_turn.cos / half_turn.sin : 2.0 / period_s;
   const std::size_t order = filter.denominator.size() - 1;
   DigitalFilter digital = {.b = mapped(filter.numerator, order, rate),
                            .a = mapped(filter.denominator, order, rate)};

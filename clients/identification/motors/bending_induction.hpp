@@ -4,6 +4,8 @@
 #include <complex>
 
 #include "clients/identification/motors/motor_models.hpp"
+#include "plant/math/exponential.hpp"
+#include "plant/math/phasor.hpp"
 
 namespace drivebench::identification {
 
@@ -49,8 +51,8 @@ struct BendingInductionModel : InductionModel {
  private:
   std::complex<double> added_current_a(const State& x) const noexcept {
     const std::complex<double> flux = magnetising_flux_wb(x);
-    const double part = std::abs(flux) / reference_wb;
-    return flux * (bend * (part < 1.0 ? std::pow(part, power) : 1.0 / part) / mutual_h);
+    const double part = magnitude(flux) / reference_wb;
+    return flux * (bend * (part < 1.0 ? drivebench::power(part, power) : 1.0 / part) / mutual_h);
   }
 };
 

@@ -12,6 +12,9 @@
 #include <vector>
 
 #include "clients/identification/data/signals.hpp"
+#include "plant/math/length.hpp"
+#include "plant/math/phasor.hpp"
+#include "plant/math/trig.hpp"
 
 namespace drivebench::identification {
 namespace {
@@ -23,7 +26,7 @@ constexpr double kWidestInterval = 0.1;  ///< of a parameter that is stated
 Impedance impedance_ohm(const MeterReading& m) {
   if (!(m.voltage_v > 0.0 && m.current_a > 0.0))
     throw IdentificationError("a test at the terminals needs voltage and current");
-  return std::polar(m.voltage_v / m.current_a, std::atan2(m.reactive_var, m.active_w));
+  return phasor(arctangent2(m.reactive_var, m.active_w), m.voltage_v / m.current_a);
 }
 
 double pulsation_rad_s(const MeterReading& m) {
@@ -33,9 +36,9 @@ double pulsation_rad_s(const MeterReading& m) {
 
 /// A reading with another impedance and the same current.
 MeterReading with_impedance(MeterReading m, Impedance z) {
-  const double apparent_va = std::hypot(m.active_w, m.reactive_var);
+  const double apparent_va = length(m.active_w, m.reactive_var);
   const double old_ohm = m.voltage_v / m.current_a;
-  m.voltage_v = std::abs(z) * m.current_a;
+  m.voltage_v = magnitude(z) * m.current_a;
   m.active_w = apparent_va / old_ohm * z.real();
   m.reactive_var = apparent_va / old_ohm * z.imag();
   return m;
@@ -161,7 +164,7 @@ NoLoadLosses no_load_losses(const TerminalReading& no_load, double stator_resist
   const double squares = no_load.phases * no_load.meter.current_a * no_load.meter.current_a;
   const double coupling = 1.0 - leakage_factor;
   NoLoadLosses losses{.power_w = squares * (z.real() - stator_resistance_ohm),
-                      .interval_w = squares * std::hypot(no_load.real_interval_ohm, resistance_interval_ohm)};
+                      .interval_w = squares * length(no_load.real_interval_ohm, resistance_interval_ohm)};
   // sigma t x^2 - (1 - sigma) x + t = 0, of which the smaller x is the run without load.
   const double t = std::max(0.0, z.real() - stator_resistance_ohm) / z.imag();
   const double root = std::sqrt(std::max(0.0, coupling * coupling - 4.0 * leakage_factor * t * t));

@@ -12,7 +12,7 @@
 #include "clients/models/bldc_machine.hpp"
 #include "clients/models/dc_machine.hpp"
 #include "clients/models/salient_pm_machine.hpp"
-#include "clients/models/two_phase.hpp"
+#include "plant/math/frames.hpp"
 
 /// The motors of the identification methods as differential equations, for re-simulation: parameters as
 /// estimated, inputs as measured.
@@ -32,12 +32,13 @@ inline constexpr double kKnownPart = 0.05;
 /// The two-phase equivalent of a star, or the phases of a two-phase machine, as a complex number; and back.
 inline std::complex<double> two_phase_of(const std::array<double, 3>& x, bool three_phase) noexcept {
   if (!three_phase) return {x[0], x[1]};
-  const PhasePair pair = drivebench::two_phase_of(x[0], x[1], x[2]);
+  const TwoPhase pair = three_to_two({.a = x[0], .b = x[1], .c = x[2]});
   return {pair.a, pair.b};
 }
 inline std::array<double, 3> phases_of(std::complex<double> x, bool three_phase) noexcept {
   if (!three_phase) return {x.real(), x.imag(), 0.0};
-  return three_phases_of({.a = x.real(), .b = x.imag()});
+  const ThreePhase phases = two_to_three({.a = x.real(), .b = x.imag()});
+  return {phases.a, phases.b, phases.c};
 }
 
 /// x as seen from a direction of length 1: x conj(direction).

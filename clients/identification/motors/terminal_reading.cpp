@@ -11,6 +11,8 @@
 
 #include "clients/identification/data/noise.hpp"
 #include "clients/identification/data/signals.hpp"
+#include "plant/math/length.hpp"
+#include "plant/math/phasor.hpp"
 
 namespace drivebench::identification {
 namespace {
@@ -72,7 +74,7 @@ double turning_hz(const std::vector<Phasor>& u, double period_s) {
   angle.reserve(u.size());
   double sum = 0.0;
   for (std::size_t k = 0; k < u.size(); ++k) {
-    if (k > 0) sum += std::arg(u[k] * std::conj(u[k - 1]));
+    if (k > 0) sum += argument(u[k] * std::conj(u[k - 1]));
     angle.push_back(sum);
   }
   const Line<double> line = line_through(angle);
@@ -105,7 +107,7 @@ Parts parts_of(const std::vector<Phasor>& u, const std::vector<Phasor>& i, std::
     Phasor voltage;
     Phasor current;
     for (std::size_t k = begin; k < end; ++k) {
-      const Phasor back = std::polar(1.0, -angle_step * static_cast<double>(k));
+      const Phasor back = phasor(-angle_step * static_cast<double>(k));
       voltage += u[k] * back;
       current += i[k] * back;
       parts.opposite_voltage += u[k] * std::conj(back);
@@ -136,22 +138,22 @@ double bare_rounding(const MeasuredData& data, std::initializer_list<const char*
 /// The relative uncertainty of a quotient that rounding leaves if each of `repeats` samples always errs
 /// alike.
 double rounding_part(const MeasuredData& data, const Parts& parts, double repeats) {
-  const double u = bare_rounding(data, {"u_a_v", "u_b_v", "u_c_v"}) / std::abs(parts.whole_voltage);
-  const double i = bare_rounding(data, {"i_a_a", "i_b_a", "i_c_a"}) / std::abs(parts.whole_current);
-  return std::hypot(u, i) / std::sqrt(repeats);
+  const double u = bare_rounding(data, {"u_a_v", "u_b_v", "u_c_v"}) / magnitude(parts.whole_voltage);
+  const double i = bare_rounding(data, {"i_a_a", "i_b_a", "i_c_a"}) / magnitude(parts.whole_current);
+  return length(u, i) / std::sqrt(repeats);
 }
 
 void check_current(const Parts& parts) {
-  if (!(std::abs(parts.whole_voltage) > 0.0)) throw IdentificationError("the record has no voltage");
-  if (!(std::abs(parts.whole_current) > 0.0)) throw IdentificationError("the record has no current");
+  if (!(magnitude(parts.whole_voltage) > 0.0)) throw IdentificationError("the record has no voltage");
+  if (!(magnitude(parts.whole_current) > 0.0)) throw IdentificationError("the record has no current");
 }
 
 /// Throws if the admittance moves through the window by more than its scatter.
 void check_steady(const std::vector<Phasor>& admittance, const SampleRange& range, double period_s) {
   const Line<Phasor> line = line_through(admittance);
   const auto count = static_cast<double>(admittance.size());
-  const double change = count * std::abs(line.slope) / std::abs(admittance.back());
-  if (!(change > kLeastTrend) || std::abs(line.slope) < 4.0 * line.deviation) return;
+  const double change = count * magnitude(line.slope) / magnitude(admittance.back());
+  if (!(change > kLeastTrend) || magnitude(line.slope) < 4.0 * line.deviation) return;
   throw IdentificationError(fmt::format(
       "the current over the voltage changes by {:.2g} % between {:.4g} and {:.4g} s: the test reads a steady "
       "state; record longer, or choose a later part with --window",
@@ -165,7 +167,7 @@ std::optional<double> speed_of(const MeasuredData& data, const Settings& e, cons
   const Series angle = measured_angle(data, e);
   const auto first = angle.begin() + static_cast<std::ptrdiff_t>(range.first);
   const std::vector<double> window(first, first + static_cast<std::ptrdiff_t>(range.count()));
-  return std::abs(line_through(window).slope) / data.period_s;
+  return magnitude(line_through(window).slope) / data.period_s;
 }
 
 /// Meter and intervals from the means of the parts.
@@ -178,8 +180,8 @@ void fill(TerminalReading& reading, const Parts& parts, double rounding, Phasor 
   const Phasor i = parts.whole_current;
   const Phasor power = u * std::conj(i);
   const double root = std::sqrt(static_cast<double>(reading.phases));
-  reading.meter.voltage_v = std::abs(u) / root;
-  reading.meter.current_a = std::abs(i) / root;
+  reading.meter.voltage_v = magnitude(u) / root;
+  reading.meter.current_a = magnitude(i) / root;
   reading.meter.active_w = power.real();
   reading.meter.reactive_var = reading.meter.frequency_hz > 0.0 ? power.imag() : 0.0;
   const auto count = static_cast<double>(impedance.size());
@@ -193,9 +195,9 @@ void fill(TerminalReading& reading, const Parts& parts, double rounding, Phasor 
     imaginary += (z.imag() - mean.imag()) * (z.imag() - mean.imag());
   }
   const double per_part = student(count - 1.0) / std::sqrt(count * (count - 1.0));
-  const double steps = 1.96 * rounding * std::abs(u / i);
-  reading.real_interval_ohm = std::hypot(per_part * std::sqrt(real), steps);
-  reading.imaginary_interval_ohm = std::hypot(per_part * std::sqrt(imaginary), steps);
+  const double steps = 1.96 * rounding * magnitude(u / i);
+  reading.real_interval_ohm = length(per_part * std::sqrt(real), steps);
+  reading.imaginary_interval_ohm = length(per_part * std::sqrt(imaginary), steps);
   reading.parts = impedance.size();
 }
 
@@ -243,8 +245,9 @@ TerminalReading read_terminals(const MeasuredData& data, const Settings& setting
   constexpr double kErrAlike = 6.0;
   const double repeats = feed == Feed::kAc ? length / kErrAlike : 1.0;
   fill(reading, parts, rounding_part(data, parts, repeats),
-       std::polar(1.0, angle_step * settings.processing.voltage_shift));
-  if (feed == Feed::kAc) reading.unbalance = std::abs(parts.opposite_voltage) / std::abs(parts.whole_voltage);
+       phasor(angle_step * settings.processing.voltage_shift));
+  if (feed == Feed::kAc)
+    reading.unbalance = magnitude(parts.opposite_voltage) / magnitude(parts.whole_voltage);
   reading.speed_rad_s = speed_of(data, settings, range);
   // Errors of half a step move the line through N of them by 1.5/N steps a sample at most. At an even speed
   // they do not average out: they may repeat with every sample.

@@ -13,6 +13,7 @@
 #include "clients/identification/math/runge_kutta.hpp"
 #include "clients/identification/motors/motor_models.hpp"
 #include "clients/identification/refinement/record.hpp"
+#include "plant/math/phasor.hpp"
 
 namespace drivebench::identification {
 
@@ -253,9 +254,9 @@ class Flow {
     for (std::size_t phase = 0; phase < r_.currents.size(); ++phase)
       currents[phase] = current(phase, k, errors);
     const double electrical_rad = electrical(r_.angle[k], errors);
-    const auto part = model.state_of(
-        currents, r_.first_speed,
-        {.u = {}, .electrical_rad = electrical_rad, .direction = std::polar(1.0, electrical_rad)});
+    const auto part =
+        model.state_of(currents, r_.first_speed,
+                       {.u = {}, .electrical_rad = electrical_rad, .direction = phasor(electrical_rad)});
     std::copy(part.begin(), part.end(), x.begin());
     return x;
   }

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "clients/identification/refinement/flow.hpp"
+#include "plant/math/trig.hpp"
 
 namespace drivebench::identification {
 
@@ -200,7 +201,7 @@ class Predictor : public Flow<Model> {
       }
       for (int i = 0; i < kStates; ++i)
         x[at(i)] += c.gain(i, j) * found[at(j)];
-      sum += found[at(j)] * found[at(j)] / expected2 + std::log(expected2);
+      sum += found[at(j)] * found[at(j)] / expected2 + logarithm(expected2);
     }
     return sum;
   }

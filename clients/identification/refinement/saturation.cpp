@@ -8,6 +8,7 @@
 #include <string>
 
 #include "clients/identification/data/magnetising_curve.hpp"
+#include "plant/math/trig.hpp"
 
 namespace drivebench::identification {
 namespace {
@@ -38,7 +39,7 @@ Result saturated_start(const Result& straight, double largest_wb) {
     return e.name.starts_with('K') || e.name == "M" || e.name == "L_R" || e.name == "R_R";
   });
   for (int k = 1; k <= kPoints; ++k) {
-    const double flux_wb = three_digits(largest_wb * std::sin(0.5 * std::numbers::pi * k / kPoints));
+    const double flux_wb = three_digits(largest_wb * sine(0.5 * std::numbers::pi * k / kPoints));
     start.curve_wb.push_back(flux_wb);
     start.parameters.push_back(unmeasured(curve_name(flux_wb), "A", flux_wb / straight.at("M")));
   }

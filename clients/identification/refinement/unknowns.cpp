@@ -4,6 +4,8 @@
 #include <utility>
 
 #include "clients/identification/data/magnetising_curve.hpp"
+#include "plant/math/exponential.hpp"
+#include "plant/math/trig.hpp"
 
 namespace drivebench::identification {
 namespace {
@@ -46,7 +48,7 @@ Eigen::VectorXd coordinates_of(const std::vector<Unknown>& unknowns, const Resul
   Eigen::VectorXd z(static_cast<Eigen::Index>(unknowns.size()));
   for (std::size_t k = 0; k < unknowns.size(); ++k) {
     const double value = result.at(unknowns[k].name);
-    z(static_cast<Eigen::Index>(k)) = unknowns[k].scale > 0.0 ? value / unknowns[k].scale : std::log(value);
+    z(static_cast<Eigen::Index>(k)) = unknowns[k].scale > 0.0 ? value / unknowns[k].scale : logarithm(value);
   }
   return z;
 }
@@ -54,7 +56,7 @@ Eigen::VectorXd coordinates_of(const std::vector<Unknown>& unknowns, const Resul
 void put(const std::vector<Unknown>& unknowns, const Eigen::VectorXd& at, Result& result) {
   for (std::size_t k = 0; k < unknowns.size(); ++k) {
     const double z = at(static_cast<Eigen::Index>(k));
-    result.find(unknowns[k].name)->value = unknowns[k].scale > 0.0 ? z * unknowns[k].scale : std::exp(z);
+    result.find(unknowns[k].name)->value = unknowns[k].scale > 0.0 ? z * unknowns[k].scale : exponential(z);
   }
 }
 

@@ -11,10 +11,15 @@
 
 #include "clients/identification/data/noise.hpp"
 #include "clients/identification/motors/terminal_voltages.hpp"
-#include "clients/models/two_phase.hpp"
+#include "plant/math/frames.hpp"
+#include "plant/math/phasor.hpp"
 
 namespace drivebench::identification {
 namespace {
+
+double squared(double x) noexcept {
+  return x * x;
+}
 
 using Complex = std::complex<double>;
 using Matrix = Eigen::MatrixXd;
@@ -57,7 +62,7 @@ std::vector<Complex> winding(const MeasuredData& data, const Settings& e, char q
     const auto from = static_cast<std::size_t>(std::clamp<std::ptrdiff_t>(k + later, 0, last));
     Complex& value = x[static_cast<std::size_t>(k)];
     if (phases.size() == 3) {
-      const PhasePair pair = drivebench::two_phase_of(phases[0][from], phases[1][from], phases[2][from]);
+      const TwoPhase pair = three_to_two({.a = phases[0][from], .b = phases[1][from], .c = phases[2][from]});
       value = {pair.a, pair.b};
     } else {
       value = {phases[0][from], phases.size() == 2 ? phases[1][from] : 0.0};
@@ -214,13 +219,13 @@ Complex FluxEquations::put_row(const Window& w, double n, bool salient, std::spa
   } else {
     for (std::size_t h = 0; h < harmonics(); ++h) {
       const double order = n * kHarmonics[h];
-      c[3 + 2 * h] = std::polar(1.0, order * w.last_angle) - std::polar(1.0, order * w.first_angle);
+      c[3 + 2 * h] = phasor(order * w.last_angle) - phasor(order * w.first_angle);
       c[4 + 2 * h] = kJ * c[3 + 2 * h];
     }
     if (salient) {
       const std::size_t first = 3 + 2 * harmonics();
-      c[first] = std::polar(1.0, 2.0 * n * w.last_angle) * std::conj(w.last_i) -
-                 std::polar(1.0, 2.0 * n * w.first_angle) * std::conj(w.first_i);
+      c[first] = phasor(2.0 * n * w.last_angle) * std::conj(w.last_i) -
+                 phasor(2.0 * n * w.first_angle) * std::conj(w.first_i);
       c[first + 1] = kJ * c[first];
     }
   }
@@ -234,13 +239,13 @@ std::vector<double> FluxEquations::noise_of_columns(double n, bool salient) cons
   const bool dc = kind_ == MotorKind::kDc;
   const double each = (dc ? 1.0 : 2.0) * static_cast<double>(windows_.size());
   std::vector<double> noise2(columns(salient), 0.0);
-  noise2[0] = 2.0 * each * std::pow(period_s_ * u_noise_v_, 2);
-  noise2[1] = each * period_s_ * mean_s_ * std::pow(i_noise_a_, 2);
-  noise2[2] = 2.0 * each * std::pow(i_noise_a_, 2);
-  if (dc) noise2[3] = 2.0 * each * std::pow(angle_noise_rad_, 2);
+  noise2[0] = 2.0 * each * squared(period_s_ * u_noise_v_);
+  noise2[1] = each * period_s_ * mean_s_ * squared(i_noise_a_);
+  noise2[2] = 2.0 * each * squared(i_noise_a_);
+  if (dc) noise2[3] = 2.0 * each * squared(angle_noise_rad_);
   if (dc || kind_ == MotorKind::kInduction) return noise2;
   for (std::size_t h = 0; h < harmonics(); ++h)
-    noise2[3 + 2 * h] = noise2[4 + 2 * h] = each * std::pow(n * kHarmonics[h] * angle_noise_rad_, 2);
+    noise2[3 + 2 * h] = noise2[4 + 2 * h] = each * squared(n * kHarmonics[h] * angle_noise_rad_);
   if (salient) noise2[3 + 2 * harmonics()] = noise2[4 + 2 * harmonics()] = noise2[2];
   return noise2;
 }
@@ -266,9 +271,9 @@ FluxFit FluxEquations::fit(int turn, bool salient) const {
               .shift_deviation = std::sqrt(rows.variance(0))};
   if (kind_ != MotorKind::kInduction && !dc) {
     const Complex magnet(rows.at(3), rows.at(4));
-    fit.zero_rad = std::arg(magnet);
+    fit.zero_rad = argument(magnet);
     fit.zero_deviation =
-        std::sqrt(std::max(rows.variance(3), rows.variance(4))) / std::max(1e-300, std::abs(magnet));
+        std::sqrt(std::max(rows.variance(3), rows.variance(4))) / std::max(1e-300, magnitude(magnet));
   }
   return fit;
 }

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include "plant/math/exponential.hpp"
+#include "plant/math/trig.hpp"
 
 namespace drivebench::regression {
 namespace {
@@ -14,25 +16,25 @@ using Quantity = double ResponsePoint::*;
 /// neighbours, at an end of the line to its neighbour.
 double slope(Points p, Quantity y, std::size_t i) {
   const auto secant = [&](std::size_t a, std::size_t b) {
-    return (p[b].*y - p[a].*y) / std::log(p[b].hz / p[a].hz);
+    return (p[b].*y - p[a].*y) / logarithm(p[b].hz / p[a].hz);
   };
   if (i == 0) return secant(0, 1);
   if (i + 1 == p.size()) return secant(i - 1, i);
-  const double before = std::log(p[i].hz / p[i - 1].hz);
-  const double after = std::log(p[i + 1].hz / p[i].hz);
+  const double before = logarithm(p[i].hz / p[i - 1].hz);
+  const double after = logarithm(p[i + 1].hz / p[i].hz);
   return (secant(i - 1, i) * after + secant(i, i + 1) * before) / (before + after);
 }
 
 /// Between line i and the next one, at the part s of the way there.
 double hermite(Points p, Quantity y, std::size_t i, double s) {
-  const double length = std::log(p[i + 1].hz / p[i].hz);
+  const double length = logarithm(p[i + 1].hz / p[i].hz);
   const double rest = 1.0 - s;
   return p[i].*y * (1.0 + 2.0 * s) * rest * rest + p[i + 1].*y * (3.0 - 2.0 * s) * s * s +
          length * (slope(p, y, i) * s * rest * rest - slope(p, y, i + 1) * s * s * rest);
 }
 
 ResponseAt between(Points p, std::size_t i, double s) {
-  return {.hz = p[i].hz * std::pow(p[i + 1].hz / p[i].hz, s),
+  return {.hz = p[i].hz * power(p[i + 1].hz / p[i].hz, s),
           .gain_db = hermite(p, &ResponsePoint::gain_db, i, s),
           .phase_deg = hermite(p, &ResponsePoint::phase_deg, i, s)};
 }
@@ -87,7 +89,7 @@ std::optional<ResponseAt> response_at(Points p, double hz) {
     return ResponseAt{.hz = hz, .gain_db = p.back().gain_db, .phase_deg = p.back().phase_deg};
   }
   const auto i = static_cast<std::size_t>(after - p.begin()) - 1;
-  return between(p, i, std::log(hz / p[i].hz) / std::log(p[i + 1].hz / p[i].hz));
+  return between(p, i, logarithm(hz / p[i].hz) / logarithm(p[i + 1].hz / p[i].hz));
 }
 
 LoopMargins margins_of(Points p) {

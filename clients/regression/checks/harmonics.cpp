@@ -4,6 +4,8 @@
 #include <complex>
 #include <cstddef>
 #include <numbers>
+#include "plant/math/length.hpp"
+#include "plant/math/phasor.hpp"
 
 namespace drivebench::regression {
 namespace {
@@ -14,12 +16,12 @@ using Complex = std::complex<double>;
 class Phasor {
  public:
   explicit Phasor(double turns_a_sample) noexcept
-      : turns_(turns_a_sample), step_(std::polar(1.0, 2.0 * std::numbers::pi * turns_a_sample)) {}
+      : turns_(turns_a_sample), step_(phasor(2.0 * std::numbers::pi * turns_a_sample)) {}
 
   Complex at(std::size_t k) noexcept {
     if (k % 64 == 0) {
       const double turns = turns_ * static_cast<double>(k);
-      now_ = std::polar(1.0, 2.0 * std::numbers::pi * (turns - std::floor(turns)));
+      now_ = phasor(2.0 * std::numbers::pi * (turns - std::floor(turns)));
     } else {
       now_ *= step_;
     }
@@ -164,7 +166,7 @@ std::vector<double> harmonic_amplitudes(std::span<const double> values, double p
   std::vector<double> amplitudes{std::abs(x[0])};
   amplitudes.reserve(last + 1);
   for (std::size_t n = 1; n <= last; ++n)
-    amplitudes.push_back(std::hypot(x[2 * n - 1], x[2 * n]));
+    amplitudes.push_back(length(x[2 * n - 1], x[2 * n]));
   return amplitudes;
 }
 

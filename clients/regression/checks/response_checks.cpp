@@ -10,6 +10,8 @@
 
 #include "clients/regression/checks/check_kinds.hpp"
 #include "clients/regression/checks/frequency_response.hpp"
+#include "plant/math/phasor.hpp"
+#include "plant/math/trig.hpp"
 
 /// Checks on the answer to a multisine.
 namespace drivebench::regression {
@@ -52,7 +54,7 @@ class FrequencyResponse final : public Check {
     const std::uint32_t period = lines_.period_ticks;
     turn_.reserve(period);
     for (std::uint32_t k = 0; k < period; ++k)
-      turn_.push_back(std::polar(1.0, -2.0 * std::numbers::pi * k / period));
+      turn_.push_back(phasor(-2.0 * std::numbers::pi * k / period));
     const auto ticks = [&facts](double s) { return std::llround(s / facts.period_s); };
     start_tick_ = ticks(spec.excitation->begin_s);
     if (spec.excitation->has_trigger) start_tick_ -= ticks(spec.from_s);  // both count from the trigger
@@ -109,8 +111,8 @@ class FrequencyResponse final : public Check {
     const std::int64_t k = ((since - 1) % period + period) % period;
     const auto multiple = static_cast<std::int64_t>(list_.multiple[j]);
     const double turns = static_cast<double>(multiple * k % period) / static_cast<double>(period);
-    return std::polar(0.5 * spec().excitation->amplitude * static_cast<double>(period),
-                      2.0 * std::numbers::pi * (turns - line_phase(j) - 0.25));
+    return phasor(2.0 * std::numbers::pi * (turns - line_phase(j) - 0.25),
+                  0.5 * spec().excitation->amplitude * static_cast<double>(period));
   }
 
   ResponsePoint point_of(std::size_t j) const {
@@ -118,23 +120,22 @@ class FrequencyResponse final : public Check {
     const double turns_a_tick = static_cast<double>(list_.multiple[j]) / lines_.period_ticks;
     const bool is_load = spec().excitation->is_load;
     const double half_turn = std::numbers::pi * turns_a_tick;
-    const Complex hold = is_load ? std::polar(std::sin(half_turn) / half_turn, half_turn) : Complex(1.0);
-    const Complex in_samples = line.y / line.d;
+    const Complex hold = is_load ? phasor(half_turn, sine(half_turn) / half_turn) : Complex(1.0);
+    const Complex in_samples = quotient(line.y, line.d);
     const double scatter = line.y_squared + std::norm(in_samples) * line.d_squared -
                            2.0 * (std::conj(in_samples) * line.y_d).real();
     const double count = periods_;
-    const double error = std::sqrt(std::max(scatter, 0.0) * count / (count - 1.0)) / std::abs(line.d);
-    const Complex g = in_samples / hold;
+    const double error = std::sqrt(std::max(scatter, 0.0) * count / (count - 1.0)) / magnitude(line.d);
+    const Complex g = quotient(in_samples, hold);
     const double sign = is_load ? 1.0 : -1.0;
-    const Complex loop = sign * g / (1.0 - sign * g);
+    const Complex loop = quotient(sign * g, 1.0 - sign * g);
     const Complex response = spec().signal != nullptr ? g : loop;
     const double steepness = spec().signal != nullptr ? 1.0 : 1.0 / std::norm(1.0 - sign * g);
-    // Rounded, because the last bits of a sine depend on the processor, and reports do not.
     const auto rounded = [](double x) { return std::round(1e6 * x) * 1e-6; };
     return {.hz = turns_a_tick / seconds(1),
-            .gain_db = rounded(20.0 * std::log10(std::abs(response))),
-            .phase_deg = rounded(std::arg(response) * 180.0 / std::numbers::pi),
-            .error = rounded(error / std::abs(hold) * steepness / std::abs(response))};
+            .gain_db = rounded(20.0 * logarithm(magnitude(response)) / std::numbers::ln10),
+            .phase_deg = rounded(argument(response) * 180.0 / std::numbers::pi),
+            .error = rounded(error / magnitude(hold) * steepness / magnitude(response))};
   }
 
   Outcome outcome() const override {

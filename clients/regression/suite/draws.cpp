@@ -11,6 +11,8 @@
 #include <random>
 
 #include "clients/regression/tables/key_table.hpp"
+#include "plant/math/exponential.hpp"
+#include "plant/math/trig.hpp"
 
 namespace drivebench::regression {
 namespace {
@@ -26,8 +28,8 @@ class Stream {
   /// At least 0 and below 1.
   double unit() { return static_cast<double>(engine_() >> 11) * 0x1p-53; }
   double normal() {
-    const double radius = std::sqrt(-2.0 * std::log(1.0 - unit()));
-    return radius * std::cos(2.0 * std::numbers::pi * unit());
+    const double radius = std::sqrt(-2.0 * logarithm(1.0 - unit()));
+    return radius * cosine(2.0 * std::numbers::pi * unit());
   }
 
  private:
@@ -67,7 +69,7 @@ struct Distribution {
       case Kind::kUniform:
         return number_node(six_digits(a + (b - a) * stream.unit()), false, line);
       case Kind::kLogUniform:
-        return number_node(six_digits(a * std::exp(std::log(b / a) * stream.unit())), false, line);
+        return number_node(six_digits(a * exponential(logarithm(b / a) * stream.unit())), false, line);
       case Kind::kInteger:
         return number_node(a + std::floor((b - a + 1.0) * stream.unit()), true, line);
       case Kind::kOneOf:

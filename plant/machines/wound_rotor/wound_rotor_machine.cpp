@@ -2,6 +2,8 @@
 
 #include <cmath>
 
+#include "plant/math/length.hpp"
+
 namespace drivebench {
 
 double leakage_factor(const WoundRotorMachineParameters& p) noexcept {
@@ -109,7 +111,7 @@ double swing_rad_s(const WoundRotorMachineParameters& p, double inertia_kgm2, do
   const double field_a = std::abs(field_v) / p.field_resistance_ohm;
   const double stator_a =
       std::abs(amplitude_v) /
-      std::hypot(p.stator_resistance_ohm, electrical_rad_s * leakage_factor(p) * p.stator_inductance_h);
+      length(p.stator_resistance_ohm, electrical_rad_s * leakage_factor(p) * p.stator_inductance_h);
   return p.pole_pairs * std::sqrt(p.mutual_inductance_h * field_a * stator_a / inertia_kgm2);
 }
 

@@ -10,6 +10,7 @@
 
 #include "clients/control/estimators/flux_observers.hpp"
 #include "clients/control/estimators/load_observers.hpp"
+#include "plant/math/unbounded.hpp"
 #include "tests/book/book_bench.hpp"
 #include "tests/book/closed_loop.hpp"
 #include "tests/clients/control/induction/servo_motor.hpp"
@@ -22,17 +23,17 @@ using Complex = std::complex<double>;
 
 constexpr double kRadPerCount = 2.0 * std::numbers::pi / 2000.0;
 
-PhasePair current_of(const Sample& s) {
+TwoPhase current_of(const Sample& s) {
   return {.a = s.true_i_a_a, .b = s.true_i_b_a};
 }
-PhasePair voltage_of(const Sample& s) {
+TwoPhase voltage_of(const Sample& s) {
   return {.a = s.u_a_v, .b = s.u_b_v};
 }
 Complex flux_of(const Sample& s) {
   return {s.psi_a_wb, s.psi_b_wb};
 }
 /// Of an estimate, relative to the true flux.
-double flux_error(PhasePair estimate_wb, const Sample& s) {
+double flux_error(TwoPhase estimate_wb, const Sample& s) {
   return std::abs(Complex(estimate_wb.a, estimate_wb.b) - flux_of(s)) / std::abs(flux_of(s));
 }
 
@@ -71,11 +72,11 @@ FluxErrors flux_errors(double rate_hz) {
           std::max(worst.position,
                    std::abs(std::polar(position.magnitude_wb(), position_rad) - flux_of(s)) / magnitude_wb);
     }
-    const PhasePair i = current_of(s);
+    const TwoPhase i = current_of(s);
     euler.step(i, s.speed_rad_s);
     exact.step(i, s.speed_rad_s);
-    polar.step(control::Direction::at(polar.angle_rad()).to_dq(i), s.speed_rad_s);
-    position.step(control::Direction::at(position_rad).to_dq(i));
+    polar.step(to_dq(i, cos_sin_unbounded(polar.angle_rad())), s.speed_rad_s);
+    position.step(to_dq(i, cos_sin_unbounded(position_rad)));
   });
   EXPECT_NEAR(bench.sample().speed_rad_s, 125.40, 0.1) << rate_hz;
   return worst;
@@ -170,7 +171,7 @@ struct VergheseSanders {
   void step(const Sample& before, const Sample& now) {
     observer.step(current_of(before), voltage_of(now), before.speed_rad_s);
   }
-  PhasePair flux_wb(const Sample& s) const { return observer.flux_wb(current_of(s)); }
+  TwoPhase flux_wb(const Sample& s) const { return observer.flux_wb(current_of(s)); }
 };
 
 // Case 18 on the machine: from 0.5 Wb to 5 % of 0.169 Wb takes 4.08 time constants, of 3.59 ms for the copy
@@ -196,7 +197,7 @@ struct MartinRouchon {
   void step(const Sample& before, const Sample& now) {
     observer.step(current_of(before), voltage_of(now), before.speed_rad_s);
   }
-  PhasePair flux_wb(const Sample& s) const { return observer.flux_wb(current_of(s)); }
+  TwoPhase flux_wb(const Sample& s) const { return observer.flux_wb(current_of(s)); }
 };
 
 // Exercise 27 on the machine. Catches: the printed signs of c1, c2 and di/dt: with rates R_R·r of 1000 and
@@ -237,9 +238,9 @@ TEST(InductionObservers, BothLoadObserversFindTheLoad) {
       coupled_rad_s.add(coupled.speed_rad_s() - s.speed_rad_s);
       rotor_frame_rad_s.add(rotor_frame.speed_rad_s() - s.speed_rad_s);
     }
-    const PhasePair i = current_of(s);
+    const TwoPhase i = current_of(s);
     const double angle_rad = kRadPerCount * static_cast<double>(s.encoder_count);
-    const control::DirectQuadrature along = control::Direction::at(flux.angle_rad()).to_dq(i);
+    const Dq along = to_dq(i, cos_sin_unbounded(flux.angle_rad()));
     rotor_frame.step(i, angle_rad);
     load.step(angle_rad, machine.acceleration_per_wb_a() * flux.magnitude_wb() * along.q);
     flux.step(along, s.speed_rad_s);

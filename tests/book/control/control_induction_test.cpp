@@ -81,9 +81,9 @@ TEST(InductionControl, ConstantFluxCannotMakeTheMoveTo8000Rpm) {
   EXPECT_LT(seen.peak_speed_rad_s, 750.0);
 }
 
-// Case 11, negative: above 100 counts. Catches: friction that the bench leaves out at high speed. The table
-// has 200 to 420 counts with the text's gains, 846 with the soft ones; with 6e-5 the move is still made (4.9
-// counts).
+// Case 11, negative: above 100 counts. Catches: friction that the bench leaves out at high speed. The motor
+// falls out of step: 170 to 420 counts with the text's gains, by the last bit, 846 with the soft ones; with 6e-5
+// the move is still made (4.9 counts).
 TEST(InductionControl, FrictionForbidsTheMoveTo8000Rpm) {
   const Outcome text = closed_loop("book/8.2.5-friction");
   EXPECT_GT(text.peak_error_counts, 100.0);

@@ -37,9 +37,8 @@ double expected_square(const Outcome& seen, bool least) {
   for (const ClosedLoopRow& row : seen.rows) {
     const double torque_nm =
         kIpm.inertia_kgm2 * row.reference.acceleration_rad_s2 + kIpm.friction_nms * row.reference.speed_rad_s;
-    const control::DirectQuadrature i =
-        least ? control::least_current(kIpm, torque_nm).current_a
-              : control::DirectQuadrature{.d = 0.0, .q = torque_nm / kIpm.torque_constant_nm_per_a};
+    const Dq i = least ? control::least_current(kIpm, torque_nm).current_a
+                       : Dq{.d = 0.0, .q = torque_nm / kIpm.torque_constant_nm_per_a};
     sum += i.d * i.d + i.q * i.q;
   }
   return 1e-4 * sum;

@@ -8,6 +8,8 @@
 #include <numbers>
 #include <utility>
 
+#include "plant/math/phasor.hpp"
+#include "plant/math/trig.hpp"
 #include "protocols/number_text.hpp"
 
 namespace drivebench::command {
@@ -21,7 +23,7 @@ using identification::TerminalTest;
 constexpr double kLeastStructural = 1e-6;
 
 std::complex<double> impedance_of(const MeterReading& m) {
-  return std::polar(m.voltage_v / m.current_a, std::atan2(m.reactive_var, m.active_w));
+  return phasor(arctangent2(m.reactive_var, m.active_w), m.voltage_v / m.current_a);
 }
 
 std::string slip_text(const TestRun& run) {

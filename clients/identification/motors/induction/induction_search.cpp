@@ -2,7 +2,7 @@
 
 #include <Eigen/Dense>
 #include <algorithm>
-#include <cmath>
+#include <cstdlib>
 
 #include "clients/identification/motors/induction/induction_polynomial.hpp"
 #include "clients/identification/motors/induction/induction_regressor.hpp"
@@ -80,6 +80,13 @@ Eigen::Index index(std::size_t n) {
   return static_cast<Eigen::Index>(n);
 }
 
+double whole_power(double base, int exponent) noexcept {
+  double result = 1.0;
+  for (int n = std::abs(exponent); n > 0; --n)
+    result *= base;
+  return exponent < 0 ? 1.0 / result : result;
+}
+
 /// d^m/dK_8^m of R times the monomials of one factor.
 Vector column_at(const Triangle& factor, InductionFactor which, double k8, int derivative) {
   Vector sum = Vector::Zero();
@@ -90,7 +97,7 @@ Vector column_at(const Triangle& factor, InductionFactor which, double k8, int d
     for (int m = 0; m < derivative; ++m)
       value *= power - m;
     if (value == 0.0) continue;
-    value *= std::pow(k8, power - derivative);
+    value *= whole_power(k8, power - derivative);
     for (std::size_t i = 0; i <= j; ++i)
       sum(index(i)) += factor(i, j) * value;
   }

@@ -378,8 +378,10 @@ ResistanceEstimate ResistanceTracker::estimate_of(const MeasuredData& data) cons
   const SampleRange range = window_of(data, options_.settings.processing);
   const std::vector<InductionInstant> instants = induction_instants(data, options_.settings);
   double squares = 0.0;
-  for (std::size_t k = 0; k < phases(); ++k)
-    squares += std::pow(white_noise(data.columns[k].values), 2.0) / static_cast<double>(phases());
+  for (std::size_t k = 0; k < phases(); ++k) {
+    const double noise_a = white_noise(data.columns[k].values);
+    squares += noise_a * noise_a / static_cast<double>(phases());
+  }
   const CurrentNoise noise = {.current_a2 = squares * unit_noise_.current_a2,
                               .slope_a2_s2 = squares * unit_noise_.slope_a2_s2,
                               .current_bend_a2_s2 = squares * unit_noise_.current_bend_a2_s2};

@@ -77,11 +77,10 @@ class Bridge:
     def set(self, leg: int | str, mode: LegMode, *, period_ps: int = 0, compare_ps: int = 0, dead_ps: int = 0,
             period_start_ps: int = 0, centred: bool = False) -> None:
         """Sets a leg, by its letter or its number, from now on: legs that are set one after the other change together."""
-        number = "abc".index(leg) if isinstance(leg, str) and leg in tuple("abc") else leg
         setting = LegStruct(arguments.whole_32("mode", mode), bool(centred),
                             arguments.whole("period_start_ps", period_start_ps), arguments.whole("period_ps", period_ps),
                             arguments.whole("compare_ps", compare_ps), arguments.whole("dead_ps", dead_ps))
-        self._call("set", arguments.whole_32("leg", number), ctypes.byref(setting))
+        self._call("set", _number_of(leg), ctypes.byref(setting))
 
     def run(self, until_ps: int, room: int = 0) -> list[BridgeEdge]:
         """Runs to `until_ps` and returns the edges up to there. It ends early at the edge that fills `room`, so that 1
@@ -156,6 +155,14 @@ class Bridge:
             code = getattr(self._library, "bridge_" + name)(self._handle.pointer, *values)
             if code:
                 self._handle.fail(code)
+
+
+def _number_of(leg: int | str) -> int:
+    if not isinstance(leg, str):
+        return arguments.whole_32("leg", leg)
+    if leg not in tuple("abc"):
+        raise BadArgument(f"leg is {leg!r:.80} but must be a, b, c or its number", "leg")
+    return "abc".index(leg)
 
 
 def _edge(edge: BridgeEdgeStruct) -> BridgeEdge:

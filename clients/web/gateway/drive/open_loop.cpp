@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include "plant/math/trig.hpp"
 
 namespace drivebench::web {
 namespace {
@@ -69,7 +70,7 @@ v1::Command OpenLoop::command(std::uint64_t tick) {
   has_tick_ = true;
   const double lag_rad = terminals_.two_phase ? kTurn / 4.0 : kTurn / 3.0;
   const auto rotating = [&](std::uint32_t phase) {
-    return phase < terminals_.phases ? amplitude() * std::cos(angle_rad_ - lag_rad * phase) : 0.0;
+    return phase < terminals_.phases ? amplitude() * cosine(angle_rad_ - lag_rad * phase) : 0.0;
   };
   v1::Command command;
   command.set_axis(axis_);

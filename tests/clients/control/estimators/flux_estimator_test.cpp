@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "plant/math/unbounded.hpp"
 #include "tests/clients/control/induction/servo_motor.hpp"
 
 namespace drivebench::control {
@@ -38,11 +39,11 @@ double left_after(FluxSource source, double time_s) {
   FluxEstimator far(kServoMotor.machine, with_source(source, 0.020), kPeriod_s);
   double shaft_rad = 0.0;
   for (int k = 0; k < std::lround(time_s / kPeriod_s); ++k) {
-    const PhasePair current_a = {.a = 4.0 * std::cos(0.1 * k), .b = 4.0 * std::sin(0.1 * k)};
+    const TwoPhase current_a = {.a = 4.0 * std::cos(0.1 * k), .b = 4.0 * std::sin(0.1 * k)};
     const double speed_rad_s = 0.5 * k;
     for (FluxEstimator* each : {&near, &far}) {
       each->sample(current_a, shaft_rad);
-      each->step({.current_a = Direction::at(each->angle_rad()).to_dq(current_a),
+      each->step({.current_a = to_dq(current_a, cos_sin_unbounded(each->angle_rad())),
                   .voltage_v = {.a = 10.0, .b = -5.0},
                   .speed_rad_s = speed_rad_s,
                   .shaft_angle_rad = shaft_rad});
@@ -84,7 +85,7 @@ TEST(FluxEstimator, ThePolarChoiceIsThePolarObserver) {
   FluxEstimator chosen(kServoMotor.machine, with_source(FluxSource::kPolar), kPeriod_s);
   PolarFluxObserver alone(kServoMotor.machine, kPeriod_s);
   for (int k = 0; k < 200; ++k) {
-    const DirectQuadrature current_a = {.d = 4.0, .q = 0.02 * k - 2.0};
+    const Dq current_a = {.d = 4.0, .q = 0.02 * k - 2.0};
     chosen.step({.current_a = current_a,
                  .voltage_v = {.a = 1.0, .b = 1.0},
                  .speed_rad_s = 0.3 * k,

@@ -5,6 +5,7 @@
 
 #include "clients/control/estimators/flux_observers.hpp"
 #include "clients/control/estimators/observers.hpp"
+#include "clients/control/math/wrapped.hpp"
 #include "tests/clients/control/induction/servo_motor.hpp"
 
 namespace drivebench::control {
@@ -14,13 +15,13 @@ using Complex = std::complex<double>;
 
 constexpr double kLine_rad_s = 377.0;
 
-Complex complex_of(PhasePair x) {
+Complex complex_of(TwoPhase x) {
   return {x.a, x.b};
 }
 
 /// Currents and voltages that have nothing to do with each other: differences of two observers must not see
 /// them.
-PhasePair wave(int k, double amplitude, double phase_rad) {
+TwoPhase wave(int k, double amplitude, double phase_rad) {
   return {.a = amplitude * std::cos(0.3 * k + phase_rad), .b = amplitude * std::sin(0.17 * k)};
 }
 
@@ -84,7 +85,7 @@ TEST(PositionFluxObserver, AgreesWithThePolarObserverWithoutTheSpeed) {
     const double speed_rad_s = 0.1 * k;
     EXPECT_NEAR(wrapped(position.angle_rad(shaft_rad) - polar.angle_rad()), 0.0, 1e-9);
     EXPECT_EQ(position.magnitude_wb(), polar.magnitude_wb());
-    const DirectQuadrature current_a = {.d = 4.0, .q = -2.0 + 0.002 * k};
+    const Dq current_a = {.d = 4.0, .q = -2.0 + 0.002 * k};
     position.step(current_a);
     polar.step(current_a, speed_rad_s);
     shaft_rad += 125e-6 * speed_rad_s;
@@ -104,7 +105,7 @@ double verghese_sanders_rate_per_s(const InductionMotorModel& motor, double gain
     for (VergheseSandersObserver* observer : {&a, &b})
       observer->step(wave(k, 5.0, 1.0), wave(k, 60.0, 0.2), 0.5 * k);
   }
-  const PhasePair current_a = wave(kSteps, 5.0, 1.0);
+  const TwoPhase current_a = wave(kSteps, 5.0, 1.0);
   const double left = std::abs(complex_of(b.flux_wb(current_a)) - complex_of(a.flux_wb(current_a))) /
                       std::abs(Complex(1e-3, 1e-3));
   return -std::log(left) / (kSteps * kPeriod_s);

@@ -15,10 +15,11 @@ constexpr auto kAllWays = {Discretisation::kEuler, Discretisation::kTrapezoidal,
 
 // Catches: a series that stops too early or a squaring too few: the exponential of a matrix with known one.
 TEST(SmallMatrix, ExponentialOfADampedRotationAndOfANilpotentMatrix) {
-  const Matrix<2, 2> turned = exponential(Matrix<2, 2>{{{-1.0, 20.0}, {-20.0, -1.0}}});
+  const Matrix<2, 2> turned = matrix_exponential(Matrix<2, 2>{{{-1.0, 20.0}, {-20.0, -1.0}}});
   EXPECT_NEAR(turned[0][0], std::exp(-1.0) * std::cos(20.0), 1e-13);
   EXPECT_NEAR(turned[0][1], std::exp(-1.0) * std::sin(20.0), 1e-13);
-  const Matrix<3, 3> shifted = exponential(Matrix<3, 3>{{{0.0, 3.0, 0.0}, {0.0, 0.0, 4.0}, {0.0, 0.0, 0.0}}});
+  const Matrix<3, 3> shifted =
+      matrix_exponential(Matrix<3, 3>{{{0.0, 3.0, 0.0}, {0.0, 0.0, 4.0}, {0.0, 0.0, 0.0}}});
   EXPECT_NEAR(shifted[0][2], 6.0, 1e-13);
   EXPECT_NEAR(shifted[1][2], 4.0, 1e-13);
 }

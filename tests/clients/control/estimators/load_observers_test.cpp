@@ -7,6 +7,8 @@
 
 #include "clients/control/estimators/flux_observers.hpp"
 #include "clients/control/math/polynomial.hpp"
+#include "clients/control/math/wrapped.hpp"
+#include "plant/math/unbounded.hpp"
 #include "tests/clients/control/induction/servo_motor.hpp"
 
 namespace drivebench::control {
@@ -103,11 +105,11 @@ TEST(RotorFrameObserver, FluxLiesAlongACurrentThatTurnsWithTheRotor) {
 TEST(CoupledObserver, FindsAllFourStates) {
   CoupledObserver observer(kServo, {.angle_per_s = 1.8e3, .speed_per_s2 = 8e5}, kPeriod_s);
   PolarFluxObserver machine(kServo, kPeriod_s);
-  const DirectQuadrature current_a = {.d = 4.0, .q = 1.5};
+  const Dq current_a = {.d = 4.0, .q = 1.5};
   double shaft_rad = 0.0;
   double speed_rad_s = 20.0;
   for (int k = 0; k < 1600; ++k) {
-    observer.step(Direction::at(machine.angle_rad()).to_ab(current_a), shaft_rad);
+    observer.step(to_ab(current_a, cos_sin_unbounded(machine.angle_rad())), shaft_rad);
     const double motor_rad_s2 = kServo.acceleration_per_wb_a() * machine.magnitude_wb() * current_a.q;
     machine.step(current_a, speed_rad_s);
     shaft_rad += kPeriod_s * speed_rad_s;

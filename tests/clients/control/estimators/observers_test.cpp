@@ -5,6 +5,9 @@
 #include <cmath>
 #include <numbers>
 
+#include "clients/control/math/wrapped.hpp"
+#include "plant/math/unbounded.hpp"
+
 namespace drivebench::control {
 namespace {
 
@@ -25,11 +28,11 @@ TEST(MachineModel, HasTheDerivedConstantsOfTheServoMachine) {
 
 // Catches: a wrong sign in either transform: to_ab must undo to_dq, and d must lie along the angle.
 TEST(Frames, DirectAxisLiesAlongTheAngleAndTheTransformsAreInverse) {
-  const Direction direction = Direction::at(0.7);
-  const DirectQuadrature along = direction.to_dq({.a = 2.0 * std::cos(0.7), .b = 2.0 * std::sin(0.7)});
+  const CosSin direction = cos_sin_unbounded(0.7);
+  const Dq along = to_dq({.a = 2.0 * std::cos(0.7), .b = 2.0 * std::sin(0.7)}, direction);
   EXPECT_NEAR(along.d, 2.0, 1e-15);
   EXPECT_NEAR(along.q, 0.0, 1e-15);
-  const PhasePair back = direction.to_ab(direction.to_dq({.a = 1.5, .b = -0.25}));
+  const TwoPhase back = to_ab(to_dq({.a = 1.5, .b = -0.25}, direction), direction);
   EXPECT_NEAR(back.a, 1.5, 1e-15);
   EXPECT_NEAR(back.b, -0.25, 1e-15);
 }

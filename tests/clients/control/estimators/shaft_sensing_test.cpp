@@ -52,13 +52,13 @@ TEST(ShaftSensing, FollowsAKnownAcceleration) {
 
 // Catches: a transform that is not power-invariant, or not the inverse of the other.
 TEST(ThreePhase, IsPowerInvariantAndInvertible) {
-  const PhasePair x = two_phase_of(208.0 * std::numbers::sqrt2 * std::numbers::inv_sqrt3,
-                                   -104.0 * std::numbers::sqrt2 * std::numbers::inv_sqrt3,
-                                   -104.0 * std::numbers::sqrt2 * std::numbers::inv_sqrt3);
+  const TwoPhase x = three_to_two({.a = 208.0 * std::numbers::sqrt2 * std::numbers::inv_sqrt3,
+                                   .b = -104.0 * std::numbers::sqrt2 * std::numbers::inv_sqrt3,
+                                   .c = -104.0 * std::numbers::sqrt2 * std::numbers::inv_sqrt3});
   EXPECT_NEAR(x.a, 208.0, 1e-9);
   EXPECT_NEAR(x.b, 0.0, 1e-9);
   const Setpoint back = terminal_values({.a = 3.0, .b = -4.0}, true);
-  const PhasePair again = two_phase_of(back.a, back.b, back.c);
+  const TwoPhase again = three_to_two({.a = back.a, .b = back.b, .c = back.c});
   EXPECT_NEAR(again.a, 3.0, 1e-12);
   EXPECT_NEAR(again.b, -4.0, 1e-12);
   EXPECT_NEAR(back.a * back.a + back.b * back.b + back.c * back.c, 25.0, 1e-12);

@@ -5,14 +5,15 @@
 #include <cmath>
 #include <random>
 
+#include "plant/math/unbounded.hpp"
 #include "tests/clients/control/induction/servo_drive.hpp"
 
 namespace drivebench::control {
 namespace {
 
 /// Rates of the stator currents in the stator frame, (8.3)-(8.6) written out.
-PhasePair current_rates(const InductionMotorModel& motor, PhasePair i, PhasePair psi, double speed_rad_s,
-                        PhasePair u) {
+TwoPhase current_rates(const InductionMotorModel& motor, TwoPhase i, TwoPhase psi, double speed_rad_s,
+                       TwoPhase u) {
   const double sigma_ls = motor.leakage_inductance_h();
   const double eta_beta = motor.machine.flux_decay_per_s() * motor.current_per_wb();
   const double beta_w = motor.current_per_wb() * motor.machine.pole_pairs * speed_rad_s;
@@ -32,14 +33,14 @@ TEST(DecoupledVoltage, GivesTheRequestedRates) {
     x.speed_rad_s = 800.0 * any(random);
     x.flux_wb = 0.03 + 0.02 * any(random);
     x.flux_angle_rad = 3.0 * any(random);
-    x.flux = Direction::at(x.flux_angle_rad);
+    x.flux = cos_sin_unbounded(x.flux_angle_rad);
     x.current_a = {.d = 6.0 * any(random), .q = 6.0 * any(random)};
-    const DirectQuadrature wanted = {.d = 1e4 * any(random), .q = 1e4 * any(random)};
+    const Dq wanted = {.d = 1e4 * any(random), .q = 1e4 * any(random)};
 
-    const PhasePair u = x.flux.to_ab(decoupled_voltage_v(kServoMotor, x, wanted));
-    const PhasePair rates = current_rates(kServoMotor, x.flux.to_ab(x.current_a),
-                                          x.flux.to_ab({.d = x.flux_wb, .q = 0.0}), x.speed_rad_s, u);
-    const DirectQuadrature seen = x.flux.to_dq(rates);
+    const TwoPhase u = to_ab(decoupled_voltage_v(kServoMotor, x, wanted), x.flux);
+    const TwoPhase rates = current_rates(kServoMotor, to_ab(x.current_a, x.flux),
+                                         to_ab({.d = x.flux_wb, .q = 0.0}, x.flux), x.speed_rad_s, u);
+    const Dq seen = to_dq(rates, x.flux);
     const double flux_speed_rad_s = m.pole_pairs * x.speed_rad_s +
                                     m.flux_decay_per_s() * m.mutual_inductance_h * x.current_a.q / x.flux_wb;
     EXPECT_NEAR(seen.d + flux_speed_rad_s * x.current_a.q, wanted.d, 1e-8 * 1e4);

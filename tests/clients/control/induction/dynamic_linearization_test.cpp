@@ -42,7 +42,7 @@ TEST(VoltageLinearization, LinearisesWhileTheFluxChanges) {
   VoltageLinearizationController controller(drive, no_feedback,
                                             {.rated_flux_wb = 0.0455, .base_speed_rad_s = 300.0});
   magnetise(controller, 3.0);
-  const DirectQuadrature i_a = {.d = 4.0, .q = 2.0};
+  const Dq i_a = {.d = 4.0, .q = 2.0};
   const Setpoint u = controller.update({.i_a_a = i_a.d, .i_b_a = i_a.q}, {.jerk_rad_s3 = 5e4});
   const double flux_wb = telemetry_of(controller, "flux_wb");
   EXPECT_NEAR(flux_wb, 0.0117 * 3.0, 1e-6);

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "clients/control/math/wrapped.hpp"
 #include "clients/control/presets/induction_servo.hpp"
 
 namespace drivebench::control {

@@ -4,6 +4,8 @@
 
 #include <cmath>
 
+#include "clients/control/math/wrapped.hpp"
+#include "plant/math/unbounded.hpp"
 #include "tests/clients/control/induction/servo_drive.hpp"
 
 namespace drivebench::control {
@@ -35,7 +37,7 @@ TEST(InductionFeedback, LostSamplesAreBridged) {
   const auto state_after = [](std::int64_t stride, auto feedback) {
     for (std::int64_t k = 0; k <= 800; k += k < 400 ? 1 : stride) {
       const double angle_rad = 70.0 * kPeriod_s * static_cast<double>(k);
-      const PhasePair i = Direction::at(3.0 * angle_rad).to_ab({.d = 4.0, .q = 0.0});
+      const TwoPhase i = to_ab({.d = 4.0, .q = 0.0}, cos_sin_unbounded(3.0 * angle_rad));
       feedback.sample({.encoder_count = std::llround(angle_rad / kRadPerCount), .i_a_a = i.a, .i_b_a = i.b},
                       k <= 400 ? 1 : stride);
     }
@@ -64,7 +66,7 @@ TEST(LoadedInductionFeedback, SpeedIsNotBiasedByALoad) {
   for (int k = 0; k < 4000; ++k) {
     // The current lies where each observer has its flux, so that both see the same torque.
     const auto currents = [&](const InductionState& x) {
-      const PhasePair i = Direction::at(x.flux_angle_rad).to_ab({.d = 4.0, .q = k < 800 ? 0.0 : i_q_a});
+      const TwoPhase i = to_ab({.d = 4.0, .q = k < 800 ? 0.0 : i_q_a}, cos_sin_unbounded(x.flux_angle_rad));
       return Measurement{.i_a_a = i.a, .i_b_a = i.b};
     };
     plain.sample(currents(plain.state()), 1);

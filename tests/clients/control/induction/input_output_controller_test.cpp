@@ -4,6 +4,7 @@
 
 #include <cmath>
 
+#include "plant/math/unbounded.hpp"
 #include "tests/clients/control/induction/servo_drive.hpp"
 
 namespace drivebench::control {
@@ -92,12 +93,12 @@ TEST(InputOutputController, AngleLoopHasItsThreePoles) {
   PolarFluxObserver machine(m, h_s);
   double angle_rad = 0.0;
   double speed_rad_s = 0.0;
-  DirectQuadrature i = {.d = 0.0455 / 0.0117, .q = 0.0};
+  Dq i = {.d = 0.0455 / 0.0117, .q = 0.0};
   double e_rad = 1e-3;  // of the characteristic polynomial: e'' = -K2·e' - K1·e - K0·∫e
   double e_rad_s = 0.0;
   double integral_rad_s = 0.0;
   for (int k = -5000; k < 5000; ++k) {
-    const PhasePair phases = Direction::at(machine.angle_rad()).to_ab(i);
+    const TwoPhase phases = to_ab(i, cos_sin_unbounded(machine.angle_rad()));
     controller.update({.encoder_count = std::llround(angle_rad * 1e9 / (2.0 * std::numbers::pi)),
                        .i_a_a = phases.a,
                        .i_b_a = phases.b},

@@ -1,13 +1,14 @@
 #include "clients/control/loop/current_loop.hpp"
 
 #include <gtest/gtest.h>
+#include "plant/math/unbounded.hpp"
 
 namespace drivebench::control {
 namespace {
 
 constexpr CurrentGains kBookGains = {.proportional_v_per_a = 6.4, .integral_v_per_as = 740.0};
 constexpr double kPeriodS = 125e-6;
-const Direction kAlongPhaseA = Direction::at(0.0);
+const CosSin kAlongPhaseA = cos_sin_unbounded(0.0);
 
 // Catches: exchanged axes and an integral without its period: a constant error gives a staircase of K_I·T·e.
 TEST(CurrentLoop, IsProportionalPlusIntegralOnEachAxis) {
@@ -37,7 +38,7 @@ TEST(CurrentLoop, IntegratorsStandStillWhileAPhaseIsAtItsLimit) {
 // still possible.
 TEST(CurrentLoop, LimitHoldsPerPhaseAndNotPerAxis) {
   CurrentLoop loop(kBookGains, 80.0, kPeriodS);
-  const Direction diagonal = Direction::at(0.785398163397448);
+  const CosSin diagonal = cos_sin_unbounded(0.785398163397448);
   const PhaseVoltages inside = loop.step({.d = 110.0 / 6.4, .q = 0.0}, diagonal);
   EXPECT_FALSE(inside.saturated);
   EXPECT_NEAR(inside.voltage_v.a, 77.78, 0.01);

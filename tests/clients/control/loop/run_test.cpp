@@ -28,7 +28,7 @@ using State = std::array<double, 6>;
 struct Machine {
   double rotor_resistance_ohm = 3.9;
 
-  State derivative(const State& x, PhasePair u_v, double load_nm) const {
+  State derivative(const State& x, TwoPhase u_v, double load_nm) const {
     constexpr double kPolePairs = 3.0, kM = 0.0117, kStatorOhm = 1.7, kL = 0.014, kFriction = 1.4e-4,
                      kInertia = 1.1e-4;
     constexpr double kLeakage = 1.0 - kM * kM / (kL * kL), kMu = kPolePairs * kM / (kInertia * kL);
@@ -45,7 +45,7 @@ struct Machine {
   }
 
   /// Runge-Kutta 4 over `duration_s` in steps of 25 µs, voltages held.
-  State after(State x, PhasePair u_v, double load_nm, double duration_s) const {
+  State after(State x, TwoPhase u_v, double load_nm, double duration_s) const {
     const int steps = static_cast<int>(std::lround(duration_s / 25e-6));
     const double h_s = duration_s / steps;
     const auto ahead = [](State at, const State& slope, double dt_s) {
@@ -97,11 +97,11 @@ Outcome run(const char* preset_name, const Circumstances& c = {}) {
   const auto& controller = dynamic_cast<const FieldOrientedController&>(move.controller());
   Outcome seen;
   State x = {c.start_counts * kTurn / 2000.0};
-  PhasePair in_force_v = {0.0, 0.0};
+  TwoPhase in_force_v = {0.0, 0.0};
   std::int64_t periods = 1;
   for (; seen.samples < move.planned_samples(); ++seen.samples) {
     const bool lost = c.lose_every != 0 && seen.samples % c.lose_every == c.lose_every - 1;
-    PhasePair commanded_v = in_force_v;
+    TwoPhase commanded_v = in_force_v;
     if (lost) {
       ++periods;
     } else {

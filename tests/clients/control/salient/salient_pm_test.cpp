@@ -40,7 +40,7 @@ double searched_torque_nm(const SalientPmModel& m, double current_a) {
 TEST(LeastCurrent, NoOtherDirectionOfTheSameCurrentGivesMoreTorque) {
   for (const SalientPmModel& m : {kBuried, kInverse, kRound}) {
     for (const double torque_nm : {1e-6, 0.1, 1.0, 6.0, 40.0}) {
-      const DirectQuadrature i = least_current(m, torque_nm).current_a;
+      const Dq i = least_current(m, torque_nm).current_a;
       EXPECT_NEAR(m.torque_nm(i.d, i.q), torque_nm, 1e-12 * torque_nm);
       EXPECT_NEAR(searched_torque_nm(m, std::hypot(i.d, i.q)), torque_nm, 1e-8 * torque_nm);
       EXPECT_NEAR(most_torque_nm(m, std::hypot(i.d, i.q)), torque_nm, 1e-12 * torque_nm);
@@ -85,8 +85,8 @@ TEST(SalientReferences, TheirVoltagesBalanceThePower) {
     const Reference r = {
         .angle_rad = 0.0, .speed_rad_s = speed_rad_s, .acceleration_rad_s2 = 15e3, .jerk_rad_s3 = -1e6};
     const SalientReferences x = salient_references(p, r);
-    const DirectQuadrature u = salient_voltage_v(kBuried, x, speed_rad_s);
-    const DirectQuadrature i = x.least.current_a;
+    const Dq u = salient_voltage_v(kBuried, x, speed_rad_s);
+    const Dq i = x.least.current_a;
     const double i_d_a_s = x.torque_nm_per_s * x.least.slope_a_per_nm.d;
     const double i_q_a_s = x.torque_nm_per_s * x.least.slope_a_per_nm.q;
     const double stored_w = 1.8e-3 * i.d * i_d_a_s + 4.2e-3 * i.q * i_q_a_s;

@@ -129,7 +129,7 @@ TEST(PmOptimum, HasTheTorquesOfTheTable) {
 double by_trying(const PmMachineModel& p, const PmLimits& limits, double speed_rad_s, double direction) {
   double best = 0.0;
   bool any = false;
-  const auto take = [&](DirectQuadrature i) {
+  const auto take = [&](Dq i) {
     if (std::hypot(i.d, i.q) > limits.current_a * (1.0 + 1e-9)) return;
     if (steady_voltage_v(p, speed_rad_s, i) > limits.voltage_v * (1.0 + 1e-9)) return;
     const double torque_nm = p.torque_constant_nm_per_a * i.q;
@@ -203,7 +203,7 @@ TEST(PmTorqueTable, IsTheOptimumBetweenItsPointsToo) {
   for (double speed = -1000.0; speed <= 1000.0; speed += 13.7) {
     for (const double direction : {1.0, -1.0}) {
       const PmOptimum exact = optimum_torque(kBm500, kLarge, speed, direction).value();
-      const DirectQuadrature i = table.current_a(speed, direction);
+      const Dq i = table.current_a(speed, direction);
       EXPECT_NEAR(i.q, exact.current_a.q, 0.02) << speed;
       EXPECT_NEAR(i.d, exact.current_a.d, 0.25) << speed;  // infinitely steep where the limits part
     }

@@ -16,7 +16,7 @@ constexpr double kQuarter_rad = 0.5 * std::numbers::pi;
 // ST-01, ST-03. Catches: a sequence in the other direction, and two phases on at a full step: the vector of
 // the pattern points at the angle where the rotor rests, with a length of 1, or √2 with two phases on.
 TEST(StepPattern, PointsWhereTheRotorRests) {
-  const auto expect_at = [](PhasePair x, double angle_rad, double length) {
+  const auto expect_at = [](TwoPhase x, double angle_rad, double length) {
     EXPECT_NEAR(x.a, length * std::cos(angle_rad), 1e-12) << angle_rad;
     EXPECT_NEAR(x.b, length * std::sin(angle_rad), 1e-12) << angle_rad;
   };

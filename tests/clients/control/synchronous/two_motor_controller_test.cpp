@@ -10,7 +10,7 @@
 namespace drivebench::control {
 namespace {
 
-double across(const PhasePair& u, double angle_rad) {
+double across(const TwoPhase& u, double angle_rad) {
   return -u.a * std::sin(angle_rad) + u.b * std::cos(angle_rad);
 }
 
@@ -19,7 +19,7 @@ TEST(TwoMotors, TheVoltagesHaveTheWantedComponents) {
   for (const double first : {0.0, 0.7, 2.9}) {
     for (const double apart : {0.1, 1.2, -2.0, 3.0}) {
       const std::array<double, 2> wanted{1.3, -0.4};
-      const PhasePair u = voltages_across({first, first + apart}, wanted, 0.0);
+      const TwoPhase u = voltages_across({first, first + apart}, wanted, 0.0);
       EXPECT_NEAR(across(u, first), wanted[0], 1e-12);
       EXPECT_NEAR(across(u, first + apart), wanted[1], 1e-12);
     }
@@ -30,11 +30,11 @@ TEST(TwoMotors, TheVoltagesHaveTheWantedComponents) {
 // damping that is not that of the least squares, an inverse that explodes at the determinant 0.
 TEST(TwoMotors, AtTheDeterminantZeroTheNearestVoltagesAreGiven) {
   constexpr double kDamping = 1e-3;
-  const PhasePair same = voltages_across({0.4, 0.4}, {1.0, 3.0}, kDamping);
+  const TwoPhase same = voltages_across({0.4, 0.4}, {1.0, 3.0}, kDamping);
   EXPECT_NEAR(across(same, 0.4), 2.0, 1e-5);
-  const PhasePair opposite = voltages_across({0.4, 0.4 + M_PI}, {1.0, 3.0}, kDamping);
+  const TwoPhase opposite = voltages_across({0.4, 0.4 + M_PI}, {1.0, 3.0}, kDamping);
   EXPECT_NEAR(across(opposite, 0.4), -1.0, 1e-5);
-  const PhasePair damped = voltages_across({0.4, 0.4}, {1.0, 1.0}, 1.0);
+  const TwoPhase damped = voltages_across({0.4, 0.4}, {1.0, 1.0}, 1.0);
   EXPECT_NEAR(across(damped, 0.4), 2.0 / 3.0, 1e-12) << "2 v/(2 + d^2)";
 }
 

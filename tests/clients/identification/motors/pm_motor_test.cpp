@@ -6,7 +6,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "clients/models/two_phase.hpp"
+#include "plant/math/frames.hpp"
 #include "tests/clients/identification/bench_data.hpp"
 
 namespace drivebench::identification {
@@ -133,8 +133,8 @@ MeasuredData salient_data() {
     const double u_q = 8.0 * std::sin(60.0 * run.now_s());
     const double c = std::cos(4.0 * s.angle_rad);
     const double n = std::sin(4.0 * s.angle_rad);
-    const auto u = three_phases_of({.a = u_d * c - u_q * n, .b = u_d * n + u_q * c});
-    return PhaseCommand{.gates = Gates::kVoltage, .setpoint = {.a = u[0], .b = u[1], .c = u[2]}};
+    const auto [u_a, u_b, u_c] = two_to_three({.a = u_d * c - u_q * n, .b = u_d * n + u_q * c});
+    return PhaseCommand{.gates = Gates::kVoltage, .setpoint = {.a = u_a, .b = u_b, .c = u_c}};
   });
   return record.data();
 }
