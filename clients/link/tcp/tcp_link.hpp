@@ -133,8 +133,8 @@ class Link {
   void keep(const v1::Notice& notice);
   void keep_unasked(const v1::Envelope& envelope);
   [[noreturn]] void fail_late();
-  /// `error`: of the call that found the end, or 0. An end, a reset and a broken pipe are told alike: which of
-  /// them a peer that goes leaves behind depends on how far its bytes and ours had come.
+  /// `error`: of the call that found the end, or 0. An end, a reset and a broken pipe are told alike: which
+  /// of them a peer that goes leaves behind depends on how far its bytes and ours had come.
   [[noreturn]] void fail_ended(int error);
   [[noreturn]] void fail(const std::string& what);
 

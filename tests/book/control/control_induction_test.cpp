@@ -82,8 +82,8 @@ TEST(InductionControl, ConstantFluxCannotMakeTheMoveTo8000Rpm) {
 }
 
 // Case 11, negative: above 100 counts. Catches: friction that the bench leaves out at high speed. The motor
-// falls out of step: 170 to 420 counts with the text's gains, by the last bit, 846 with the soft ones; with 6e-5
-// the move is still made (4.9 counts).
+// falls out of step: 170 to 420 counts with the text's gains, by the last bit, 846 with the soft ones; with
+// 6e-5 the move is still made (4.9 counts).
 TEST(InductionControl, FrictionForbidsTheMoveTo8000Rpm) {
   const Outcome text = closed_loop("book/8.2.5-friction");
   EXPECT_GT(text.peak_error_counts, 100.0);

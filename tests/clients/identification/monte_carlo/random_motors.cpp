@@ -307,7 +307,7 @@ Recorded run_salient(BenchConfig config, const std::vector<double>& motor) {
     const double u_d = 1.0 + 5.0 * std::sin(kTurn * 60.0 * t);
     const double u_q = 12.0 * std::sin(kTurn * (2.0 + 15.0 * t) * t);
     const auto [u_a, u_b, u_c] = two_to_three({.a = u_d * std::cos(angle) - u_q * std::sin(angle),
-                                 .b = u_d * std::sin(angle) + u_q * std::cos(angle)});
+                                               .b = u_d * std::sin(angle) + u_q * std::cos(angle)});
     return PhaseCommand{.gates = Gates::kVoltage, .setpoint = {.a = u_a, .b = u_b, .c = u_c}};
   });
   Settings e{.kind = MotorKind::kPmSynchronous, .pole_pairs = kPolePairs, .counts_per_revolution = kCounts};
