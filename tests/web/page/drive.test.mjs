@@ -5,7 +5,7 @@ import assert from "node:assert/strict";
 import test from "node:test";
 import { page } from "./sources.mjs";
 
-const { wordsOf, verdictOf, summaryOf, countsOf, identificationIn, isInside, amplitude, drawnSpeed, gatesOf, wavesOf, fieldsOf, targetOf, pb } = page;
+const { wordsOf, verdictOf, summaryOf, countsOf, identificationIn, isInside, amplitude, drawnSpeed, gatesOf, wavesOf, fieldsOf, targetOf, Leases, pb } = page;
 
 // Catches: a common voltage of the terminals that counts as amplitude, the sum of three phases for their vector.
 test("the amplitude of terminals", () => {
@@ -13,6 +13,37 @@ test("the amplitude of terminals", () => {
   for (const angle of [0, 0.4, 2]) assert.ok(Math.abs(amplitude(three(angle)) - 10) < 1e-12);
   assert.equal(amplitude([3, -4]), 5);
   assert.equal(amplitude([-6]), -6);
+});
+
+// Catches: a lease that was given back and then, with the refusal of an older renewal, is reported as taken away; a true loss
+// that is not told.
+test("a renewal that crosses the giving back", async (t) => {
+  t.mock.timers.enable({ apis: ["setInterval"] });
+  globalThis.window = globalThis;
+  let renewed;
+  const ask = ({ lease }) => lease.action === pb.LeaseRequest.Action.ACTION_RENEW
+    ? new Promise((_, reject) => { renewed = () => reject(new Error("not yours")); }) : Promise.resolve({ done: { owner: 7 } });
+  const leases = new Leases({ description: { axes: [{ name: "a" }], lease_s: 3 }, wire: { ask } });
+  const told = [];
+  leases.watch((axis, sentence) => told.push(sentence));
+  const refuse = async () => {
+    renewed();
+    await new Promise((done) => setImmediate(done));
+  };
+  for (const isOver of [true, false]) { // the report that the drive is over comes before the refusal, or after it
+    await leases.acquire(0);
+    t.mock.timers.tick(1000);
+    leases.areGivenBack = true;
+    if (isOver) leases.lost(0, "");
+    await refuse();
+    if (!isOver) leases.lost(0, "");
+  }
+  assert.deepEqual(told, ["", "", "", ""]);
+  await leases.acquire(0);
+  t.mock.timers.tick(1000);
+  await refuse();
+  assert.deepEqual([told.at(-1), leases.holds(0)], ["lease: not yours", false]);
+  leases.end();
 });
 
 // Catches: a run that ended early and is called done, a part of a run that is rounded up to the whole.

@@ -103,7 +103,9 @@ export class DrivePanel {
 
   /** The gateway switches the gates off and then gives all leases back. */
   private giveBack(): void {
-    if (this.isDriving) this.bench.wire.order({ op: "drive", axes: [] });
+    if (!this.isDriving) return;
+    this.leases.areGivenBack = true;
+    this.bench.wire.order({ op: "drive", axes: [] });
   }
 
   private leaseChanged(axis: number, sentence: string): void {

@@ -13,6 +13,8 @@ export class Leases {
   private readonly timer: number;
   /** The gateway commands the axes of all leases. */
   areDriven = false;
+  /** The gateway gives all leases back, as the page has asked it to. */
+  areGivenBack = false;
 
   constructor(private readonly bench: Bench) {
     const axes = bench.description.axes;
@@ -45,7 +47,9 @@ export class Leases {
 
   async acquire(axis: number): Promise<void> {
     if (this.holds(axis)) return;
-    this.set(axis, (await this.ask(axis, ACTION_ACQUIRE)).done?.owner as number);
+    const { done } = await this.ask(axis, ACTION_ACQUIRE);
+    this.areGivenBack = false;
+    this.set(axis, done?.owner as number);
   }
 
   async release(axis: number): Promise<void> {
@@ -83,9 +87,12 @@ export class Leases {
     });
   }
 
+  /** A renewal that comes after a lease was given back is refused, which is no news. */
   private renew(): void {
     for (const axis of this.held) {
-      this.ask(axis, ACTION_RENEW).catch((problem: Error) => this.lost(axis, `lease: ${problem.message}`));
+      this.ask(axis, ACTION_RENEW).catch((problem: Error) => {
+        if (this.holds(axis) && !this.areGivenBack) this.lost(axis, `lease: ${problem.message}`);
+      });
     }
   }
 }
