@@ -100,7 +100,7 @@ class GateAxis {
   /// The currents that have died and the break that has opened the legs, told at the instant at which a leg
   /// was set last: the state is cut within a picosecond of them, so that they may come once more.
   struct Cut {
-    Picoseconds at = -2;
+    Picoseconds at = 0;
     std::uint64_t told = 0;  ///< bits of bit_in_cut()
   };
   struct Logged {

@@ -4,6 +4,7 @@
 #include <complex>
 #include <numbers>
 #include <span>
+
 #include "plant/math/phasor.hpp"
 #include "plant/math/trig.hpp"
 

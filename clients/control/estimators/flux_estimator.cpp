@@ -1,6 +1,7 @@
 #include "clients/control/estimators/flux_estimator.hpp"
 
 #include <string_view>
+
 #include "plant/math/length.hpp"
 #include "plant/math/trig.hpp"
 #include "plant/math/unbounded.hpp"

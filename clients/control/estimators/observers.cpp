@@ -1,6 +1,7 @@
 #include "clients/control/estimators/observers.hpp"
 
 #include <algorithm>
+
 #include "clients/control/math/wrapped.hpp"
 
 namespace drivebench::control {

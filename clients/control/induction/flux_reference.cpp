@@ -2,6 +2,7 @@
 
 #include <cmath>
 #include <utility>
+
 #include "plant/math/exponential.hpp"
 
 namespace drivebench::control {

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <numbers>
+
 #include "clients/control/math/wrapped.hpp"
 #include "plant/math/unbounded.hpp"
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+
 #include "plant/math/exponential.hpp"
 #include "plant/math/phasor.hpp"
 

@@ -1,6 +1,7 @@
 #include "clients/control/moves/standard_inputs.hpp"
 
 #include <algorithm>
+
 #include "plant/math/exponential.hpp"
 #include "plant/math/unbounded.hpp"
 

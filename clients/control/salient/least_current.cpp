@@ -1,6 +1,7 @@
 #include "clients/control/salient/least_current.hpp"
 
 #include <cmath>
+
 #include "plant/math/length.hpp"
 
 namespace drivebench::control {

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <stdexcept>
+
 #include "plant/math/length.hpp"
 
 namespace drivebench::control {
@@ -32,14 +33,14 @@ struct SteadyPm {
 ///   V² = Z²·I² + E² + 2·E·(R·i_q + X·i_d)
 /// so both points lie on a line across the direction (X, R).
 std::optional<Dq> meeting_point(const SteadyPm& m, const PmLimits& limits, double sign) noexcept {
-  const double length = std::sqrt(m.impedance2());
+  const double impedance_ohm = std::sqrt(m.impedance2());
   const double i = limits.current_a;
   const double along_a = (limits.voltage_v * limits.voltage_v - m.impedance2() * i * i - m.emf_v * m.emf_v) /
-                         (2.0 * m.emf_v * length);
+                         (2.0 * m.emf_v * impedance_ohm);
   if (!(std::abs(along_a) <= i)) return std::nullopt;
   const double across_a = std::sqrt(i * i - along_a * along_a);
-  const double cosine = m.reactance_ohm / length;
-  const double sine = m.resistance_ohm / length;
+  const double cosine = m.reactance_ohm / impedance_ohm;
+  const double sine = m.resistance_ohm / impedance_ohm;
   return Dq{.d = along_a * cosine - sign * across_a * sine, .q = along_a * sine + sign * across_a * cosine};
 }
 

@@ -3,6 +3,7 @@
 #include <array>
 #include <cmath>
 #include <numbers>
+
 #include "plant/math/unbounded.hpp"
 
 namespace drivebench::control {

@@ -1,6 +1,7 @@
 #include "clients/control/wound_dc/series_dc_observer.hpp"
 
 #include <cmath>
+
 #include "plant/math/trig.hpp"
 
 namespace drivebench::control {

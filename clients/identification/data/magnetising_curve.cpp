@@ -3,6 +3,7 @@
 #include <Eigen/Dense>
 #include <cmath>
 #include <cstddef>
+
 #include "plant/math/exponential.hpp"
 
 namespace drivebench::identification {

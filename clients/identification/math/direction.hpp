@@ -2,6 +2,7 @@
 
 #include <cmath>
 #include <complex>
+
 #include "plant/math/phasor.hpp"
 
 namespace drivebench::identification {

@@ -5,6 +5,7 @@
 #include <numeric>
 #include <string>
 #include <utility>
+
 #include "plant/math/phasor.hpp"
 
 namespace drivebench::identification {

@@ -195,7 +195,7 @@ void fill(TerminalReading& reading, const Parts& parts, double rounding, Phasor 
     imaginary += (z.imag() - mean.imag()) * (z.imag() - mean.imag());
   }
   const double per_part = student(count - 1.0) / std::sqrt(count * (count - 1.0));
-  const double steps = 1.96 * rounding * magnitude(u / i);
+  const double steps = 1.96 * rounding * (magnitude(u) / magnitude(i));
   reading.real_interval_ohm = length(per_part * std::sqrt(real), steps);
   reading.imaginary_interval_ohm = length(per_part * std::sqrt(imaginary), steps);
   reading.parts = impedance.size();

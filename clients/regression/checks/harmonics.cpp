@@ -4,6 +4,7 @@
 #include <complex>
 #include <cstddef>
 #include <numbers>
+
 #include "plant/math/length.hpp"
 #include "plant/math/phasor.hpp"
 

@@ -131,11 +131,10 @@ class FrequencyResponse final : public Check {
     const Complex loop = quotient(sign * g, 1.0 - sign * g);
     const Complex response = spec().signal != nullptr ? g : loop;
     const double steepness = spec().signal != nullptr ? 1.0 : 1.0 / std::norm(1.0 - sign * g);
-    const auto rounded = [](double x) { return std::round(1e6 * x) * 1e-6; };
     return {.hz = turns_a_tick / seconds(1),
-            .gain_db = rounded(20.0 * logarithm(magnitude(response)) / std::numbers::ln10),
-            .phase_deg = rounded(argument(response) * 180.0 / std::numbers::pi),
-            .error = rounded(error / magnitude(hold) * steepness / magnitude(response))};
+            .gain_db = 20.0 * logarithm(magnitude(response)) / std::numbers::ln10,
+            .phase_deg = argument(response) * 180.0 / std::numbers::pi,
+            .error = error / magnitude(hold) * steepness / magnitude(response)};
   }
 
   Outcome outcome() const override {

@@ -267,7 +267,7 @@ class Asyncio(unittest.TestCase):
 
     # Catches: a new call of Bench that asyncio does not have.
     def test_every_call_can_be_awaited(self):
-        self.assertEqual({name for name in vars(drivebench.Bench) if not name.startswith("_")},
+        self.assertEqual({name for name in dir(drivebench.Bench) if not name.startswith("_")},
                          {name for name in vars(drivebench.AsyncBench) if not name.startswith("_")})
 
     # Catches: an exception that stays in the worker.

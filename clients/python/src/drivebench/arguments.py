@@ -27,7 +27,7 @@ def whole_32(name: str, value: SupportsIndex) -> int:
 
 
 def whole(name: str, value: SupportsIndex) -> int:
-    """A count of ticks: 0 to 2^64 - 1."""
+    """A whole number of 64 bits, such as a tick or an instant in picoseconds."""
     try:
         count = operator.index(value)
     except TypeError:

@@ -2,15 +2,13 @@
 import ctypes
 import dataclasses
 import enum
-import types
-import weakref
 from collections.abc import Callable, Iterable, Mapping, Sequence, Sized
-from typing import Any, Self
+from typing import Any
 
 from drivebench import arguments
 from drivebench.description import Description, description_of
 from drivebench.errors import BadArgument, Code
-from drivebench.handle import Handle
+from drivebench.handle import Handle, Opened
 from drivebench.library import ABI, MAX_EDGES, CommandStruct, EdgeStruct, OptionsStruct, Sample, load
 from drivebench.recorder import Recorder
 
@@ -59,7 +57,7 @@ OFF = Command(off=True)
 SHORT = Command(short=True)
 
 
-class Bench:
+class Bench(Opened):
     """An open bench; a context manager, which closes it.
 
     address: "inproc:BENCH" (in this process: a bench file, or the name of one that came with drivebench),
@@ -85,9 +83,7 @@ class Bench:
         code = library.open_abi(arguments.string("address", address), options, ABI, library.sample_size, ctypes.byref(pointer))
         if code != Code.OK:
             raise library.error_for(code, None)
-        self.address = address
-        self._handle = Handle(pointer, library.close, library.error_for, "bench")
-        self._finalizer = weakref.finalize(self, self._handle.close)  # also at exit
+        super().__init__(address, Handle(pointer, library.close, library.error_for, "bench"))
         self._library = library
         self._description_struct = library.describe(pointer).contents
         self._sample_type = library.sample_type(self._description_struct)
@@ -97,20 +93,6 @@ class Bench:
         self._numbers.update((number, number) for number in range(len(axes)))
         self._ticks: dict[int, int] = {}  # by axis: of the newest sample that a call has returned
         self._recorders: list[Recorder] = []
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None,
-                 trace: types.TracebackType | None) -> None:
-        self.close()
-
-    def close(self) -> None:
-        """Releases the axes and closes the bench; again does nothing."""
-        self._handle.close()
-
-    def __repr__(self) -> str:
-        return f"Bench({self.address!r}{', closed' if self._handle.pointer is None else ''})"
 
     def describe(self) -> Description:
         """The bench with its axes, parameters, signals and faults."""

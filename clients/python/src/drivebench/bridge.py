@@ -1,13 +1,11 @@
 """The gate level: the power stage of a bench in this process, its legs set at any picosecond."""
 import ctypes
 import enum
-import types
-import weakref
-from typing import Any, NamedTuple, Self
+from typing import Any, NamedTuple
 
 from drivebench import arguments
 from drivebench.errors import BadArgument, Code
-from drivebench.handle import Handle
+from drivebench.handle import Handle, Opened
 from drivebench.library import ABI, BridgeEdgeStruct, BridgeMeansStruct, BridgeStateStruct, LegStruct, load
 
 
@@ -40,7 +38,7 @@ class BridgeEdge(NamedTuple):
     level: int
 
 
-class Bridge:
+class Bridge(Opened):
     """An axis of "inproc:BENCH" at gate level; a context manager, which closes it.
 
     The drive is of kind "switched_inverter", and all legs are open at first. Times are in picoseconds since the
@@ -55,24 +53,8 @@ class Bridge:
                                        ctypes.sizeof(BridgeStateStruct), ctypes.sizeof(BridgeMeansStruct), ctypes.byref(pointer))
         if code != Code.OK:
             raise library.bridge_error_for(code, None)
-        self.address = address
         self._library = library
-        self._handle = Handle(pointer, library.bridge_close, library.bridge_error_for, "bridge")
-        self._finalizer = weakref.finalize(self, self._handle.close)  # also at exit
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None,
-                 trace: types.TracebackType | None) -> None:
-        self.close()
-
-    def close(self) -> None:
-        """Closes the bridge; again does nothing."""
-        self._handle.close()
-
-    def __repr__(self) -> str:
-        return f"Bridge({self.address!r}{', closed' if self._handle.pointer is None else ''})"
+        super().__init__(address, Handle(pointer, library.bridge_close, library.bridge_error_for, "bridge"))
 
     def set(self, leg: int | str, mode: LegMode, *, period_ps: int = 0, compare_ps: int = 0, dead_ps: int = 0,
             period_start_ps: int = 0, centred: bool = False) -> None:

@@ -2,9 +2,10 @@
 import ctypes
 import os
 import threading
+import types
 import weakref
 from collections.abc import Callable
-from typing import Any, NoReturn
+from typing import Any, NoReturn, Self
 
 from drivebench.errors import BenchClosed, Code, DrivebenchError
 
@@ -42,6 +43,29 @@ class Handle:
         self.lock = threading.RLock()
         self.pointer = None
         self._why_closed = f"the {self._what} was opened before the fork and belongs to the parent; open another one here"
+
+
+class Opened:
+    """What an address has opened: a context manager, which closes it."""
+
+    def __init__(self, address: str, handle: Handle) -> None:
+        self.address = address
+        self._handle = handle
+        self._finalizer = weakref.finalize(self, handle.close)  # also at exit
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None,
+                 trace: types.TracebackType | None) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Closes it, which releases all axes; again does nothing."""
+        self._handle.close()
+
+    def __repr__(self) -> str:
+        return f"{type(self).__name__}({self.address!r}{', closed' if self._handle.pointer is None else ''})"
 
 
 def _abandon_all() -> None:

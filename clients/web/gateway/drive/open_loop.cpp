@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+
 #include "plant/math/trig.hpp"
 
 namespace drivebench::web {

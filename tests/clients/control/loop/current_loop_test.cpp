@@ -1,6 +1,7 @@
 #include "clients/control/loop/current_loop.hpp"
 
 #include <gtest/gtest.h>
+
 #include "plant/math/unbounded.hpp"
 
 namespace drivebench::control {
