@@ -69,10 +69,14 @@ class Bench {
 
   /// One axis: its command, and its next sample.
   Sample step(const Command& command) {
-    const drivebench_command wanted = command.to_c();
     Sample sample;
-    check(drivebench_step(bench_.get(), &wanted, 1, &sample));
+    step(command, sample);
     return sample;
+  }
+  /// The same into a sample of the caller's, which is kept if the step fails.
+  void step(const Command& command, Sample& sample) {
+    const drivebench_command wanted = command.to_c();
+    check(drivebench_step(bench_.get(), &wanted, 1, &sample));
   }
   /// Several axes: samples[i] belongs to commands[i].
   void step(std::span<const Command> commands, std::span<Sample> samples) {

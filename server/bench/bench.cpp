@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <new>
 #include <utility>
 
 #include "plant/parameters/parameters.hpp"
@@ -404,7 +405,7 @@ void Bench::take_sample(std::size_t index) noexcept {
   AxisRuntime& a = axes_[index];
   const Control& c = control_of(a);
   const Tick answered = c.in_force.answers;
-  a.sample = a.axis.sample(tick_);
+  ::new (&a.sample) Sample(a.axis.sample(tick_));  // made where it stays, not copied there
   a.sample.command_tick = answered;
   a.sample.command_age_ticks = answered < 0 ? 0 : static_cast<std::uint64_t>(tick_ - 1 - answered);
   a.sample.missed_commands = c.missed;

@@ -129,13 +129,15 @@ int InprocBench::give(const drivebench_command& c) noexcept {
 
 int InprocBench::step(std::span<const drivebench_command> commands) noexcept {
   if (const int code = check_commands(commands); code != DRIVEBENCH_OK) return code;
-  // All or none: the first command that is refused is given alone, so that the bench counts it.
-  const auto refused = std::ranges::find_if(commands, [this](const drivebench_command& c) {
-    return judge(command_of(c), kOwner, bench_.command_view(c.axis)) != Refused::kNot;
-  });
-  if (refused != commands.end()) return give(*refused);
-  for (const drivebench_command& c : commands)
-    give(c);
+  if (commands.size() > 1) {  // all or none: the first one that is refused is given alone, so that it counts
+    const auto refused = std::ranges::find_if(commands, [this](const drivebench_command& c) {
+      return judge(command_of(c), kOwner, bench_.command_view(c.axis)) != Refused::kNot;
+    });
+    if (refused != commands.end()) return give(*refused);
+  }
+  for (const drivebench_command& c : commands) {
+    if (const int code = give(c); code != DRIVEBENCH_OK) return code;
+  }
   bench_.step();
   return DRIVEBENCH_OK;
 }

@@ -111,6 +111,20 @@ TEST(Sdk, NullPointersAreRefusedByName) {
   drivebench_close(bench);
 }
 
+// Catches: a sample that a refused step has half written, or emptied.
+TEST(Sdk, ARefusedStepLeavesTheSampleOfTheCallerAsItWas) {
+  Bench bench(kServo);
+  bench.acquire();
+  Sample sample{};
+  bench.step({}, sample);
+  EXPECT_EQ(sample.tick, 1u);
+  const Sample before = sample;
+  EXPECT_EQ(refusal_of([&] { bench.step({.axis = 7}, sample); }).code(), DRIVEBENCH_UNKNOWN_AXIS);
+  EXPECT_EQ(std::memcmp(&sample, &before, sizeof(Sample)), 0);
+  bench.step({.tick = 1}, sample);
+  EXPECT_EQ(std::memcmp(&sample, &static_cast<const Sample&>(bench.newest()), sizeof(Sample)), 0);
+}
+
 // Catches: the sentence of an earlier call shown as that of the last.
 TEST(Sdk, ASentenceIsForgottenByTheNextCall) {
   Bench bench(kServo);

@@ -113,7 +113,8 @@ const Sample& InprocAxis::exchange(const link::AxisCommand& command) {
                              .setpoint_f = x.f,
                              .legs_off = command.legs_off,
                              .edges = {}};
-  request([&] { samples_[axis_] = std::bit_cast<Sample>(bench_.step(ours)); });
+  request([&] { bench_.step(ours, answer_); });
+  samples_[axis_] = std::bit_cast<Sample>(answer_);
   read_second();
   return samples_[axis_];
 }

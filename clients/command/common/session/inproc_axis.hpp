@@ -45,6 +45,7 @@ class InprocAxis final : public link::AxisLink {
   v1::BenchDescription description_;
   std::uint32_t axis_ = 0;
   std::optional<std::uint32_t> second_axis_;  ///< on the same amplifier
+  client::Sample answer_;                     ///< to the last command
   std::vector<Sample> samples_;
 };
 
