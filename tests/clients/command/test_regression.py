@@ -135,21 +135,6 @@ override.axis.servo.machine.rotor_resistance_ohm = [3.9, 5.85]
                 burner.wait()
         self.assertEqual(quiet, loaded)
 
-    def test_a_tube_lies_around_the_run_of_a_reference_controller(self):
-        """Catches: a reference that runs on another bench or without the steps, a preset that is told only when the case runs."""
-        step = "[[step]]\nat_s = 0.05\nload_nm = 0.05\n"
-        tube = '[[check]]\nname = "as the book"\nkind = "tube"\nsignal = "i_a_a"\nreference = "{}"\nabs = {}\n'
-        self.write("servo.toml", SERVO + step + tube.format("book/8.2.2", 0.0))
-        self.suite()
-        self.write("servo.toml", SERVO.replace("[[check]]", '[dut.gains]\n"position.proportional_per_s2" = 20000.0\n[[check]]', 1) + step
-                   + tube.format("book/8.2.2", 0.05))
-        (failed,) = [check for check in self.suite(code=FAILED)["cases"][0]["checks"] if not check["passed"]]
-        self.assertEqual(failed["name"], "as the book")
-        for reference, why in (("book/none", "book/none"), ("exercise/9.9", "which does not fit the bench")):
-            self.write("servo.toml", SERVO + tube.format(reference, 0.1))
-            done = self.run_test(self.folder / "suite", code=USAGE)
-            self.assertRegex(done.stderr, f"check.reference.*{why}")
-
     def reports(self, *arguments, code=OK):
         """The bytes of all reports."""
         names = [self.folder / f"report.{kind}" for kind in ("json", "xml", "html")]

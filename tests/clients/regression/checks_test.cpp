@@ -196,6 +196,43 @@ TEST(Checks, ATubeFollowsTheGoldenRunTickByTick) {
   std::filesystem::remove(file);
 }
 
+/// A run of the signal speed_rad_s over these ticks, as a file until the end.
+class GoldenFile {
+ public:
+  GoldenFile(int first, int last, const std::function<double(std::uint64_t)>& speed) {
+    std::ofstream out(path_);
+    out << "tick,time_s,speed_rad_s [rad/s]\n";
+    for (int tick = first; tick <= last; ++tick)
+      out << tick << "," << tick * kPeriod_s << "," << speed(static_cast<std::uint64_t>(tick)) << "\n";
+  }
+  GoldenFile(const GoldenFile&) = delete;
+  GoldenFile& operator=(const GoldenFile&) = delete;
+  ~GoldenFile() { std::filesystem::remove(path_); }
+  std::string key() const { return "golden = \"" + path_.string() + "\"\n"; }
+
+ private:
+  std::filesystem::path path_ = std::filesystem::temp_directory_path() / "drivebench-golden-tube.csv";
+};
+
+// Catches: a tube that is open below or, where the golden value is negative, closed; ticks after the last of
+// the golden run held against it; a golden run of other times that passes, as nothing is compared.
+TEST(Checks, ATubeHasTwoSidesAndTwoEnds) {
+  const auto minus_ten = [](std::uint64_t) { return -10.0; };
+  const Course below{.speed = [](std::uint64_t tick) { return tick == 25 ? -10.5 : -10.0; }};
+  const Course leaves_later{.speed = [](std::uint64_t tick) { return tick > 60 ? 0.0 : -10.0; }};
+  {
+    const GoldenFile golden(0, 60, minus_ten);
+    EXPECT_EQ(found(speed_check("tube", golden.key() + "abs = 0.4"), below).at_s, 0.025);
+    EXPECT_TRUE(found(speed_check("tube", golden.key() + "rel = 0.06"), below).passed);
+    EXPECT_FALSE(found(speed_check("tube", golden.key() + "rel = 0.04"), below).passed);
+    EXPECT_TRUE(found(speed_check("tube", golden.key() + "abs = 0.0"), leaves_later).passed);
+  }
+  const GoldenFile later(200, 300, minus_ten);
+  const Finding never = found(speed_check("tube", later.key() + "abs = 0.0"), below);
+  EXPECT_FALSE(never.passed);
+  EXPECT_EQ(never.sentence, "never applied: the golden run has no tick of the window");
+}
+
 // Catches: a mistake in a case file that is taken for a check.
 TEST(Checks, MistakesAreRefusedWithKeyAndRule) {
   const auto has = [](const std::string& keys, std::string_view part) {

@@ -157,6 +157,15 @@ TEST_F(Compose, ALineOfTheComposedBenchIsOneOfTheCase) {
   EXPECT_EQ(line_of("rotor_resistance_ohm = 1.0"), 0);
 }
 
+// Catches: a port that the system chooses, at which a drive that runs already would never look.
+TEST_F(Compose, OnlyAProgramIsToldThePortOfModbus) {
+  const ConfigNode attached =
+      composed("mode = \"realtime\"\n[dut]\nattached = \"modbus\"\n[dut.modbus]\naddress = \"127.0.0.1\"");
+  EXPECT_EQ(std::ranges::count(at(attached, {"modbus"}).children, std::string("port"), &ConfigNode::key), 0);
+  const ConfigNode started = composed("[dut]\ncommand = [\"program\"]\nlink = \"modbus\"");
+  EXPECT_EQ(std::get<std::int64_t>(at(started, {"modbus", "port"}).scalar), 0);
+}
+
 // Catches: tokens that are looked for beside the composed bench, which stands elsewhere.
 TEST_F(Compose, TheTokensOfAnAttachedDriveStandBesideItsCase) {
   const ConfigNode bench = composed(

@@ -73,6 +73,26 @@ TEST(Judge, LateTicksInRealTimeMakeTheRunInvalid) {
   EXPECT_EQ(run(c, 1, 3, 0).verdict, Verdict::kPass);
 }
 
+// Catches: a step that acted while an attached drive was still asleep, told as one that never did.
+TEST(Judge, AStepMayActBeforeAnAttachedDriveArms) {
+  Case c = case_with(50.0);
+  c.device.kind = DeviceUnderTest::Kind::kAttached;
+  Step step{.line = 7};
+  step.when =
+      CaseCondition{"speed_rad_s > 40", std::get<NamedCondition>(parse_condition("two.speed_rad_s > 40"))};
+  c.steps.push_back(step);
+  Judge judge(c, kTwoAxes, false);
+  for (std::uint64_t tick = 0; tick < 50; ++tick) {
+    std::vector<Sample> axes(2);
+    for (Sample& sample : axes)
+      sample = {.tick = tick, .state = tick < 20 ? 5u : 1u};
+    axes[1].speed_rad_s = tick < 20 ? 50.0 : 5.0;
+    judge.see(axes);
+  }
+  const CaseResult result = judge.result();
+  EXPECT_EQ(result.verdict, Verdict::kPass) << result.reason;
+}
+
 // Catches: a case with an attached drive whose time, late ticks or end are those of the bench.
 TEST(Judge, TheTimeOfAnAttachedDriveBeginsWhenItArms) {
   Case c = case_with(5.0);
