@@ -147,6 +147,12 @@ std::optional<bool> read_command_line(int argc, char** argv, ServerOptions& o) {
   app.add_option("--unix", o.unix_path, "also listen on this unix socket")
       ->type_name("FILE")
       ->check(not_empty);
+  app.add_option(
+         "--spin-us", o.spin_us,
+         "look for so long for the next request before sleeping: quicker answers for a CPU of its own; "
+         "default: 0")
+      ->type_name("MICROSECONDS")
+      ->check(whole_between(0, 1000));
   add_run(app, o);
   add_record(app, o);
   add_instead(app, o)->excludes(config);

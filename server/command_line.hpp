@@ -32,6 +32,7 @@ struct ServerOptions {
   std::uint64_t file_mib = 0;  ///< size of each file of a recording; 0: no limit
   double chunk_ms = 0.0;       ///< plant time that a kill may cost a recording; 0: the default
   bool require_realtime = false;
+  int spin_us = 0;               ///< for so long the I/O thread looks for more before it sleeps
   bool measure_answers = false;  ///< for the verdict in JSON
   std::string messages;          ///< a file of messages to the device under test
   std::string lines;             ///< takes those that are lines

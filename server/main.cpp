@@ -26,6 +26,7 @@
 #include "server/host/log.hpp"
 #include "server/host/memory.hpp"
 #include "server/host/print_line.hpp"
+#include "server/host/run_io.hpp"
 #include "server/host/service_notification.hpp"
 #include "server/host/stop_signal.hpp"
 #include "server/interface_text.hpp"
@@ -366,7 +367,7 @@ int serve(const ServerOptions& o, const BenchConfig& config) {
   end_without_memory(kFailed);
   bool broken = false;
   try {
-    io.run();
+    run_io(io, std::chrono::microseconds(o.spin_us));
   } catch (const std::exception& error) {
     log::critical(fmt::format("the run ends: {}", error.what()));
     broken = true;

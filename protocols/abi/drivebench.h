@@ -3,13 +3,16 @@
  *
  * One small set of calls, the same over every way to a bench:
  *
- *   inproc:BENCH                 the bench in this process: a bench file, or the name of one that came with
- * drivebench tcp:HOST:PORT, HOST:PORT     a drivebench-server (`drivebench serve`), port 7300 unless named
+ *   inproc:BENCH                 the bench in this process: a bench file, or the name of a shipped one
+ *   tcp:HOST:PORT, HOST:PORT     a drivebench-server (`drivebench serve`), port 7300 unless named
  *   tls:HOST:PORT?ca=FILE&certificate=FILE&key=FILE
- *   unix:PATH
- *   shm:PATH?spin_us=N           the unix socket of the server, and exchanges through memory that both share
+ *   unix:PATH                    the same on this machine
+ *   shm:PATH                     its unix socket, and exchanges through memory that both share
  *   can:BACKEND:CHANNEL?node=N   one axis over the native CAN profile
  *   modbus:HOST:PORT?unit=N      one axis over Modbus TCP
+ *
+ * With ?spin_us=N behind a tcp:, unix: or shm: address the program looks so long for an answer before it
+ * sleeps.
  *
  * Over inproc, tcp, tls, unix and shm the same calls give the same samples, bit for bit. CAN FD and Modbus
  * carry float32, classic CAN scaled integers: they round.

@@ -49,21 +49,36 @@ std::string socket_path(std::string_view text, std::string_view path) {
   return std::string(path);
 }
 
+constexpr std::string_view kSpin = "?spin_us=";
+
+/// Takes `?spin_us=N` off the end of a place; nothing: there is no `?`.
+std::optional<std::chrono::microseconds> take_spin(std::string_view text, std::string_view& place,
+                                                   unsigned largest_us) {
+  const std::size_t mark = place.rfind('?');
+  if (mark == std::string_view::npos) return std::nullopt;
+  const std::string_view option = place.substr(mark);
+  const auto spin_us =
+      option.starts_with(kSpin) ? number_in(option.substr(kSpin.size())) : std::optional<unsigned>{};
+  if (!spin_us || *spin_us > largest_us)
+    bad_address(text, "behind the ? stands spin_us=N with N from 0 to " + std::to_string(largest_us));
+  place = place.substr(0, mark);
+  return std::chrono::microseconds(*spin_us);
+}
+
 /// Parses the part of a shm: address behind the colon.
 Address shm_address(std::string_view text, std::string_view place) {
-  constexpr std::string_view kSpin = "?spin_us=";
   Address address{.host = {}, .port = {}, .path = {}, .shares_memory = true};
-  const std::size_t mark = std::min(place.rfind('?'), place.size());
-  if (mark < place.size()) {
-    const std::string_view option = place.substr(mark);
-    const auto spin =
-        option.starts_with(kSpin) ? number_in(option.substr(kSpin.size())) : std::optional<unsigned>{};
-    if (!spin || *spin > shm::kMaxSpinUs) {
-      bad_address(text, "behind the ? stands spin_us=N with N from 0 to " + std::to_string(shm::kMaxSpinUs));
-    }
-    address.spin = std::chrono::microseconds(*spin);
-  }
-  address.path = socket_path(text, place.substr(0, mark));
+  address.spin = take_spin(text, place, shm::kMaxSpinUs).value_or(std::chrono::microseconds(20));
+  address.path = socket_path(text, place);
+  return address;
+}
+
+/// Parses the part of a unix: address behind the colon.
+Address unix_address(std::string_view text, std::string_view place) {
+  Address address{.host = {}, .port = {}, .path = {}};
+  if (place.find(kSpin) != std::string_view::npos)  // another ? is one of the path
+    address.spin = *take_spin(text, place, kMaxSocketSpinUs);
+  address.path = socket_path(text, place);
   return address;
 }
 
@@ -154,9 +169,7 @@ Address parse_address(std::string_view text) {
   constexpr std::string_view kUnix = "unix:";
   constexpr std::string_view kShm = "shm:";
   constexpr std::string_view kTcp = "tcp:";
-  if (text.starts_with(kUnix)) {
-    return {.host = {}, .port = {}, .path = socket_path(text, text.substr(kUnix.size()))};
-  }
+  if (text.starts_with(kUnix)) return unix_address(text, text.substr(kUnix.size()));
   if (text.starts_with(kShm)) return shm_address(text, text.substr(kShm.size()));
   constexpr std::string_view kTls = "tls:";
   Address address{.host = {}, .port = {}, .path = {}, .tls = text.starts_with(kTls), .files = {}};
@@ -164,6 +177,8 @@ Address parse_address(std::string_view text) {
   if (const std::size_t mark = place.find('?'); address.tls && mark != std::string_view::npos) {
     address.files = files_in(text, place.substr(mark + 1));
     place = place.substr(0, mark);
+  } else {
+    address.spin = take_spin(text, place, kMaxSocketSpinUs).value_or(address.spin);
   }
   std::string_view host = place;
   std::string_view port = "7300";
@@ -182,7 +197,6 @@ Address parse_address(std::string_view text) {
     bad_address(
         text, "a bench file is opened in this process as inproc:FILE, or served by `drivebench serve FILE`");
   }
-  if (place.find('?') != std::string_view::npos) bad_address(text, "files behind a ? are for tls: addresses");
   if (!is_port(port)) bad_address(text, "the port must be a number from 1 to 65535");
   address.host = host;
   address.port = port;

@@ -31,8 +31,8 @@ class AddressError : public std::invalid_argument {
 inline constexpr std::string_view kDefaultAddress = "tcp:127.0.0.1:7300";
 
 /// The address of a bench: `tcp:HOST:PORT`, `HOST:PORT` (an IPv6 host in brackets; without a port 7300),
-/// `tls:HOST:PORT?ca=FILE&certificate=FILE&key=FILE` (each file may be left out), `unix:PATH`, or
-/// `shm:PATH?spin_us=N`: the unix socket of the bench, and exchanges through shared memory.
+/// `tls:HOST:PORT?ca=FILE&certificate=FILE&key=FILE` (each file may be left out), `unix:PATH`, or `shm:PATH`:
+/// the unix socket of the bench, and exchanges through shared memory. All but tls: may end in `?spin_us=N`.
 struct Address {
   std::string host;
   std::string port;
@@ -40,9 +40,11 @@ struct Address {
   bool tls = false;
   TlsFiles files{};
   bool shares_memory = false;
-  /// With shared memory: for so long both sides look for each other's word before they sleep.
-  std::chrono::microseconds spin{20};
+  /// For so long this side looks for an answer before it sleeps; with shared memory both sides.
+  std::chrono::microseconds spin{0};
 };
+
+inline constexpr unsigned kMaxSocketSpinUs = 1000;
 
 /// Throws AddressError.
 Address parse_address(std::string_view text);

@@ -39,7 +39,11 @@ std::string seconds(std::chrono::milliseconds duration) {
 
 Link::Link(const Address& address, const LinkOptions& options)
     : Link(connect_to(address, options.deadline), to_string(address), options) {
-  if (address.shares_memory) share_memory(address.spin);
+  if (address.shares_memory) {
+    share_memory(address.spin);
+  } else {
+    spin_ = address.spin;
+  }
 }
 
 Link::Link(FileDescriptor socket, std::string peer, const LinkOptions& options)
@@ -307,6 +311,7 @@ v1::Envelope* Link::next_envelope() {
 void Link::receive_some() {
   if (!socket_.is_open()) throw LinkError("the link to " + peer_ + " is closed");
   const std::span<std::byte> space = reader_.free_space();
+  if (spin_.count() > 0 && look_before_sleeping(space)) return;
   for (;;) {
     const std::ptrdiff_t received = taken_ == nullptr ? ::recv(socket_.get(), space.data(), space.size(), 0)
                                                       : receive_with_descriptors(space);
@@ -315,6 +320,20 @@ void Link::receive_some() {
     if (errno == EAGAIN) fail_late();
     if (errno != EINTR) fail_ended(errno);
   }
+}
+
+/// Whether something came while this thread looked for it; an end or an error is left to the next call.
+bool Link::look_before_sleeping(std::span<std::byte> space) {
+  const Clock::time_point end = Clock::now() + spin_;
+  do {
+    const ssize_t received = ::recv(socket_.get(), space.data(), space.size(), MSG_DONTWAIT);
+    if (received > 0) {
+      reader_.received(static_cast<std::size_t>(received));
+      return true;
+    }
+    if (received == 0 || (errno != EAGAIN && errno != EINTR)) return false;
+  } while (Clock::now() < end);
+  return false;
 }
 
 void Link::fail_late() {

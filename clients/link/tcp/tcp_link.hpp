@@ -124,6 +124,7 @@ class Link {
   const v1::Envelope& await_answer();
   v1::Envelope* next_envelope();
   void receive_some();
+  bool look_before_sleeping(std::span<std::byte> space);
   std::ptrdiff_t receive_with_descriptors(std::span<std::byte> space);
   void share_memory(std::chrono::microseconds spin);
   std::span<const AxisSample> exchange_in_memory(std::span<const AxisCommand> commands);
@@ -141,6 +142,7 @@ class Link {
   FileDescriptor socket_;
   std::string peer_;
   std::chrono::milliseconds deadline_;
+  std::chrono::microseconds spin_{0};
   v1::Welcome welcome_;
   std::uint64_t last_id_ = 0;
   std::vector<std::byte> out_;

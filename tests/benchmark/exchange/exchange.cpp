@@ -88,6 +88,28 @@ struct Round {
   Percentiles floor, tcp, unix_socket;
 };
 
+/// A controller and a server of its own that both look for the other's word before they sleep.
+Row measure_looking(const std::string& bench, PingPong& floor, CpuPair cpu) {
+  auto pinned = std::make_unique<Pinned>(cpu.far);
+  Server server({bench, "--spin-us", "200"});
+  pinned = std::make_unique<Pinned>(cpu.near);
+  Controller controller(server.address() + "?spin_us=200");
+  struct Looked {
+    Percentiles floor, looking;
+  };
+  const std::array cpus{cpu.near, cpu.far};
+  const auto rounds = undisturbed_rounds(cpus, kRounds, [&]() -> Looked {
+    return {.floor = time_exchanges(kBlock, [&] { floor.exchange(); }),
+            .looking = time_exchanges(kBlock, [&] { controller.exchange(); })};
+  });
+  return {.name = "exchange tcp p50, both look before they sleep",
+          .unit = "us",
+          .measured = median(rounds.results, [](const Looked& round) { return round.looking.p50; }),
+          .floor = median(rounds.results, [](const Looked& round) { return round.floor.p50; }),
+          .disturbance = rounds.disturbance,
+          .note = "--spin-us 200 and ?spin_us=200; the floor sleeps"};
+}
+
 Rounds<Round> alternate(Controller& tcp, Controller& unix_socket, PingPong& floor, CpuPair cpu) {
   const Pinned pinned(cpu.near);
   const std::array cpus{cpu.near, cpu.far};
@@ -145,6 +167,7 @@ std::vector<Row> measure_exchange() {
           row("exchange tcp p99", across, kTcp, kP99, kMaxP99Ratio),
           row("exchange unix p50", across, kUnix, kP50, {}, "the floor is that of TCP"),
           row("exchange unix p99", across, kUnix, kP99, {}),
+          measure_looking(bench, floor, cpu),
           row("exchange tcp p50, one CPU", same, kTcp, kP50, {}, "both ends pinned to one CPU"),
           row("exchange unix p50, one CPU", same, kUnix, kP50, {})};
 }

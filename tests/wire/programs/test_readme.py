@@ -29,7 +29,7 @@ PROGRAMS = ("drivebench", "drivebench-server")
 NOT_RUN = {
     "drivebench web                                      # the same in a browser, with a scope, triggers and knobs: http://127.0.0.1:7380/":
         "needs the page, which npm builds; test_gateway.py and test_page.py try it",
-    "drivebench-server configs/benches/servo.toml [--mode realtime|lockstep|free] [--port N] [--unix PATH]":
+    "drivebench-server configs/benches/servo.toml [--mode realtime|lockstep|free] [--port N] [--unix PATH] [--spin-us N]":
         "a synopsis; test_commands.py tries each option",
     "drivebench-server --replay FILE.mcap [--json]": "a synopsis; test_commands.py replays recordings",
     "drivebench-server --write-pages FOLDER": "a synopsis; test_pages.py writes them",

@@ -37,7 +37,16 @@ TEST(Address, ReadsEveryForm) {
   EXPECT_EQ(shared.path, "/run/a?b");
   EXPECT_EQ(shared.spin, 100us);
   EXPECT_TRUE(shared.shares_memory);
+  EXPECT_EQ(parse_address("shm:/run/a").spin, 20us);
   EXPECT_FALSE(parse_address("unix:/run/a").shares_memory);
+  const Address looking = parse_address("unix:/run/a?b?spin_us=1000");
+  EXPECT_EQ(looking.path, "/run/a?b");
+  EXPECT_EQ(looking.spin, 1000us);
+  EXPECT_EQ(parse_address("unix:/run/a?b").path, "/run/a?b");
+  EXPECT_EQ(parse_address("unix:/run/a?b").spin, 0us);
+  EXPECT_EQ(round_trip("tcp:[::1]:81?spin_us=5"), "tcp:[::1]:81");
+  EXPECT_EQ(parse_address("tcp:[::1]:81?spin_us=5").spin, 5us);
+  EXPECT_EQ(parse_address("bench?spin_us=0").port, "7300");
 }
 
 // Catches: an address that would connect somewhere else than written, or a path that is cut off.
@@ -59,6 +68,11 @@ TEST(Address, RefusesInvalidTexts) {
                                  "tls:a?key=k",
                                  "tls:a?certificate=c&ca=d",
                                  "tcp:a?ca=b",
+                                 "tcp:a?spin_us=1001",
+                                 "a:81?spin_us=",
+                                 "tls:a?spin_us=1",
+                                 "unix:/a?spin_us=1001",
+                                 "unix:/a?spin_us=1?b",
                                  "shm:",
                                  "shm:?spin_us=1",
                                  "shm:/a?spin=5",
