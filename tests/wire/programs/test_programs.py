@@ -260,6 +260,7 @@ class Serving(CommandTest):
                 ([SERVO, "--record-file-s", "1e400"], "1e400 is not a number above 0 and at most 1e9"),
                 ([SERVO, "--record-file-mib", "-1"], "-1 is not a whole number of 1 or more"),
                 ([SERVO, "--bus", "-1"], "-1 is not a whole number from 1 to 8"), ([SERVO, "--replay", "r.mcap"], "--replay"),
+                ([SERVO, "--spin-us", "1001"], "1001 is not a whole number from 0 to 1000"),
                 (["--replay", "none.mcap"], "none.mcap"), ([SERVO, "--record", "none/r.mcap"], "none/r.mcap"),
                 ([SERVO, "--unix", "none/socket"], "none/socket"),
                 *(([SERVO, option, ""], f"{option}: must not be empty")
