@@ -332,7 +332,8 @@ class Identify(WireTest):
             self.assertLessEqual(max(map(abs, columns["u_a_v"])), 10.0)
 
     def test_a_suggestion_is_refused_where_it_cannot_be_made(self):
-        """Catches: trials on somebody's server, limits without a search, a motor of another kind, endless frequencies."""
+        """Catches: trials on somebody's server, limits without a search, a motor of another kind, endless frequencies, forty
+        trials in search of what the gentlest experiment already exceeds."""
         for words, reason in ((("--suggest", "--from", "a.csv"), "--from reads what was measured"),
                               (("--suggest", "--link", "unix:/nothing"), "server of its own"),
                               (("--suggest", "--experiment", "two-sines"), "--experiment runs one that there is"),
@@ -340,6 +341,8 @@ class Identify(WireTest):
                               (("--suggest", "--seconds", "0.001"), "100 samples"),
                               (("--suggest", "--trials", "0"), "--trials"),
                               (("--suggest", "--max-current", "-1"), "--max-current"),
+                              (("--suggest", "--max-current", "0.001"), "--max-current 0.001 cannot be kept: the gentlest"),
+                              (("--suggest", "--max-speed", "1e-6"), "--max-speed 1e-06 cannot be kept"),
                               (("--suggest", "--bench", "im-a"), "of kind induction"),
                               (("--suggest", "--bench", "no-such-bench"), "no-such-bench"),
                               (("--max-current", "3"), "--suggest")):

@@ -3,6 +3,7 @@
 #include <fmt/core.h>
 
 #include <cmath>
+#include <string>
 #include <string_view>
 #include <utility>
 
@@ -66,6 +67,21 @@ void check_duration(double duration_s, double period_s) {
                     duration_s, kFewest, period_s));
 }
 
+/// Refuses limits that the gentlest experiment of a family exceeds: no other stays within them.
+void check_limits(const ExperimentLimits& limits, const ExperimentForecast& gentlest) {
+  std::string reasons;
+  const auto compare = [&reasons](const char* option, double limit, double used, const char* unit) {
+    if (!(limit > 0.0) || used <= limit) return;
+    reasons += fmt::format("{}{} {:g} cannot be kept: the gentlest experiment takes {:.3g} {}",
+                           reasons.empty() ? "" : "; ", option, limit, used, unit);
+  };
+  compare("--max-current", limits.current_a, gentlest.current_a, "A");
+  compare("--max-voltage", limits.voltage_v, gentlest.voltage_v, "V");
+  compare("--max-speed", limits.speed_rad_s, gentlest.speed_rad_s, "rad/s");
+  if (!reasons.empty())
+    throw UsageError(reasons + ", as the sensors show it with their noise; raise the limit well above that");
+}
+
 double score_of(const ExperimentForecast& forecast) {
   if (forecast.limit_used > 1.0) return kBeyondLimits * forecast.limit_used;
   return std::isfinite(forecast.worst) ? forecast.worst : kUnused;
@@ -100,10 +116,11 @@ class Suggestion {
     check_duration(report_.limits.duration_s, known.data.period_s);
     report_.ideal_currents =
         known.bench["current_sensor.bits"] == 0.0 && known.bench["current_sensor.noise_rms_a"] == 0.0;
-    try_existing();
-
     const ExperimentDesign design =
         design_for(motor_, known.drive, known.bench, report_.limits, known.data.period_s);
+    check_limits(report_.limits, forecasts_.measured(excited(base, design, gentlest(design))));
+    try_existing();
+
     Progress progress("suggest");
     const auto score = [&](const std::vector<double>& at) {
       const ExperimentForecast forecast = tried(excited(base, design, at));

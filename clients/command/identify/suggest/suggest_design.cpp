@@ -1,6 +1,7 @@
 #include "clients/command/identify/suggest/suggest_design.hpp"
 
 #include <algorithm>
+#include <cstddef>
 
 namespace drivebench::command {
 namespace {
@@ -119,6 +120,13 @@ ExperimentDesign line_start(bool source, const BenchParameters& bench, const Exp
 }
 
 }  // namespace
+
+std::vector<double> gentlest(const ExperimentDesign& design) {
+  std::vector<double> at;
+  for (std::size_t k = 0; k < design.variables.size(); ++k)
+    at.push_back(k % 2 == 0 ? design.variables[k].least : design.variables[k].most);
+  return at;
+}
 
 ExperimentDesign design_for(const identification::MotorName& motor, std::string_view drive,
                             const BenchParameters& bench, const ExperimentLimits& limits, double period_s) {

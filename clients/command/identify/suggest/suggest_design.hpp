@@ -22,10 +22,13 @@ struct ExperimentLimits {
 
 /// A family of experiments: what may change, and how it is put into a request.
 struct ExperimentDesign {
-  std::string sentence;  ///< for the reader of the file
-  std::vector<identification::SearchVariable> variables;
+  std::string sentence;                                   ///< for the reader of the file
+  std::vector<identification::SearchVariable> variables;  ///< amplitudes, each with its frequency; instants
   std::function<void(const std::vector<double>&, v1::RunExperiment&)> excite;
 };
+
+/// The smallest amplitudes and the highest frequencies of a family: the least current and speed that it has.
+std::vector<double> gentlest(const ExperimentDesign& design);
 
 /// The family that suits this kind of motor on this drive ("source", "voltage_amplifier"):
 ///   im on a source: starts with one amplitude and frequency and goes on with another; with an amplifier: the

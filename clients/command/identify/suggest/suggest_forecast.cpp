@@ -92,17 +92,33 @@ MeasuredMotor Forecasts::prepare(WantedExperiment& experiment) const {
   return bench_.describe(experiment);
 }
 
+/// Runs an experiment and puts what it uses into the forecast.
+MeasuredMotor Forecasts::take(WantedExperiment wanted, ExperimentForecast& forecast) const {
+  auto& signals = *wanted.file.request.mutable_signals();
+  if (std::ranges::find(signals, "speed_rad_s") == signals.end()) *signals.Add() = "speed_rad_s";
+  MeasuredMotor m = bench_.measure(options_, wanted);
+  if (interrupted()) throw std::runtime_error("interrupted");
+  forecast.current_a = largest_phase(m.data, 'i', 'a');
+  forecast.voltage_v = largest_phase(m.data, 'u', 'v');
+  forecast.speed_rad_s = largest_of(m.data.at("speed_rad_s"));
+  return m;
+}
+
+ExperimentForecast Forecasts::measured(WantedExperiment wanted) const {
+  ExperimentForecast forecast;
+  try {
+    take(std::move(wanted), forecast);
+  } catch (const link::RefusalError& error) {
+    forecast.problem = error.what();
+  }
+  return forecast;
+}
+
 ExperimentForecast Forecasts::run(std::string name, WantedExperiment wanted,
                                   const NamedExperiment* named) const {
   ExperimentForecast forecast{.name = std::move(name)};
-  auto& signals = *wanted.file.request.mutable_signals();
-  if (std::ranges::find(signals, "speed_rad_s") == signals.end()) *signals.Add() = "speed_rad_s";
   try {
-    const MeasuredMotor m = bench_.measure(options_, wanted);
-    if (interrupted()) throw std::runtime_error("interrupted");
-    forecast.current_a = largest_phase(m.data, 'i', 'a');
-    forecast.voltage_v = largest_phase(m.data, 'u', 'v');
-    forecast.speed_rad_s = largest_of(m.data.at("speed_rad_s"));
+    const MeasuredMotor m = take(std::move(wanted), forecast);
     identification::Settings settings = settings_for(options_, motor_, named, m);
     const bool round = truth_of(motor_.kind, m.bench).contains("L_S");
     settings.rotor = round ? identification::Rotor::kRound : identification::Rotor::kSalient;

@@ -45,12 +45,18 @@ class Forecasts {
   /// kind.
   MeasuredMotor prepare(WantedExperiment& experiment) const;
 
+  /// The largest current, voltage and speed of an experiment, without an identification; one that cannot be
+  /// run says why.
+  ExperimentForecast measured(WantedExperiment wanted) const;
+
   /// Runs an experiment; one that cannot be run or used says why. `named` is null for a file of the user.
   /// Throws std::runtime_error if the server is lost or the user interrupts.
   ExperimentForecast run(std::string name, WantedExperiment wanted,
                          const identification::NamedExperiment* named) const;
 
  private:
+  MeasuredMotor take(WantedExperiment wanted, ExperimentForecast& forecast) const;
+
   IdentifyOptions options_;
   const identification::MotorName& motor_;
   OwnBench bench_;
