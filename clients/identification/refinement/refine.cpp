@@ -13,6 +13,7 @@
 #include <utility>
 #include <vector>
 
+#include "clients/identification/data/magnetising_curve.hpp"
 #include "clients/identification/motors/bending_induction.hpp"
 #include "clients/identification/motors/saturated_induction.hpp"
 #include "clients/identification/refinement/bend.hpp"
@@ -101,19 +102,31 @@ std::vector<BendingInductionModel> bending_motors(Series flux_wb, const BendingI
   return motors;
 }
 
-/// What the fit of a straight motor says of its iron.
-struct Straight {
-  std::optional<BendTest> bend{};  ///< nothing if a motor with a bend leaves all bounds
+/// What the fit of an induction motor says of its iron.
+struct Iron {
+  std::optional<BendTest> bend{};  ///< of a straight motor; nothing if one with a bend leaves all bounds
   double largest_wb = 0.0;         ///< of the magnetising flux, once the filter knows it; 0: there is no fit
 };
 
-Straight straight_of(const Predictor<InductionModel>& predictor, const Fit& fit,
-                     const std::vector<Unknown>& unknowns, const BendingInductionModel& motor) {
+constexpr std::ptrdiff_t kUnsettled = 16;  ///< a part of the record: until the filter knows the flux
+
+/// The largest magnetising flux of a motor with a curve. One that begins at rest knows it from the start on,
+/// whose flux is the largest.
+double largest_flux_wb(const std::vector<Predictor<SaturatedInductionModel>::State>& filtered,
+                       const PredictorRecord& record) {
+  const auto unsettled = record.from_rest ? 0 : static_cast<std::ptrdiff_t>(filtered.size()) / kUnsettled;
+  double largest2 = 0.0;
+  for (auto x = filtered.begin() + unsettled; x != filtered.end(); ++x)
+    largest2 = std::max(largest2, (*x)[2] * (*x)[2] + (*x)[3] * (*x)[3]);
+  return std::sqrt(largest2);
+}
+
+Iron straight_of(const Predictor<InductionModel>& predictor, const Fit& fit,
+                 const std::vector<Unknown>& unknowns, const BendingInductionModel& motor) {
   constexpr double kBend = 1e-4;
-  constexpr std::ptrdiff_t kUnsettled = 16;  // a part of the record
   const Series flux_wb = magnetising_fluxes(predictor, motor);
   const auto settled = flux_wb.begin() + static_cast<std::ptrdiff_t>(flux_wb.size()) / kUnsettled;
-  Straight straight{.largest_wb = *std::max_element(settled, flux_wb.end())};
+  Iron straight{.largest_wb = *std::max_element(settled, flux_wb.end())};
   const auto motors = bending_motors(flux_wb, motor, kBend);
   Eigen::MatrixXd directions(fit.residual.size(), static_cast<Eigen::Index>(motors.size()));
   Eigen::VectorXd bent;
@@ -156,7 +169,7 @@ std::string reason_against(const Result& result, const PredictorRecord& record) 
 }
 
 template <class Model>
-Straight refine_with(const PredictorRecord& record, const Settings& e, Result& result, const Result* near) {
+Iron refine_with(const PredictorRecord& record, const Settings& e, Result& result, const Result* near) {
   const double duration_s = record.period_s * static_cast<double>(record.range.count());
   std::vector<Unknown> unknowns = unknowns_of(e, result, record.largest_speed, duration_s);
   add_sensors(e, record, result, unknowns);
@@ -169,11 +182,11 @@ Straight refine_with(const PredictorRecord& record, const Settings& e, Result& r
     noise.current_a = near->explanation->current_noise_a;
   }
   const Fit fit = fit_in_rounds(record, e, predictor, unknowns, trial, noise, near != nullptr);
-  Straight straight;
+  Iron iron;
   if (!fit.found) {
     set_apart(e, unknowns, false, result);
     result.excitation = verdict_against(result, "no motor near that of the equations follows it");
-    return straight;
+    return iron;
   }
   put_fit(e, unknowns, fit, result);
   result.explanation = explanation_of(predictor, fit, noise, record, e);
@@ -181,34 +194,48 @@ Straight refine_with(const PredictorRecord& record, const Settings& e, Result& r
   for (const auto& x : predictor.filtered())
     speeds.push_back(x[Model::kSpeed]);
   if constexpr (std::is_same_v<Model, InductionModel>)
-    straight = straight_of(predictor, fit, unknowns, BendingInductionModel(trial, e));
+    iron = straight_of(predictor, fit, unknowns, BendingInductionModel(trial, e));
+  if constexpr (std::is_same_v<Model, SaturatedInductionModel>)
+    iron.largest_wb = largest_flux_wb(predictor.filtered(), record);
   result.explanation->unlikelihood = predictor.unlikelihood(Model(trial, e), noise);
   const std::string reason = reason_against(result, record);
   result.explanation->holds = reason.empty();
   set_apart(e, unknowns, reason.empty(), result);
   if (!reason.empty()) {
     result.excitation = verdict_against(result, reason);
-    return straight;
+    return iron;
   }
-  if (straight.bend && straight.bend->evidence > kTellsBend) {
+  if (iron.bend && iron.bend->evidence > kTellsBend) {
     result.explanation->holds = false;
-    result.excitation = verdict_on_saturation(result, *straight.bend);
-    return straight;
+    result.excitation = verdict_on_saturation(result, *iron.bend);
+    return iron;
   }
   const double torque_nm = accelerating_torque(speeds, record.period_s, result.at("J"));
   result.excitation = verdict_on(e.kind, unseen_parameters(result, torque_nm, rms(speeds)));
-  if (straight.bend && result.excitation.sufficient) result.notes.push_back(straight_note(*straight.bend));
-  return straight;
+  if (iron.bend && result.excitation.sufficient) result.notes.push_back(straight_note(*iron.bend));
+  return iron;
+}
+
+/// A motor with a magnetising curve near a straight one. The straight fit does not know the largest flux of
+/// the record, which its curve must reach: points that miss it are placed anew, from the first curve on.
+Result saturated_near(const PredictorRecord& record, const Settings& e, const Result& straight,
+                      double largest_wb) {
+  constexpr double kMiss = 0.02;
+  Result first = saturated_start(straight, largest_wb);
+  const double reached_wb = refine_with<SaturatedInductionModel>(record, e, first, nullptr).largest_wb;
+  const bool misses = reached_wb > 0.0 && std::abs(reached_wb / first.curve_wb.back() - 1.0) > kMiss;
+  if (!misses || !magnetising_curve(first).rises()) return first;
+  Result again = saturated_start(straight, reached_wb, &first);
+  refine_with<SaturatedInductionModel>(record, e, again, &first);
+  return again;
 }
 
 /// An induction motor: straight if that explains the record, else with a magnetising curve if that does.
 void refine_induction(const MeasuredData& data, const Settings& e, const PredictorRecord& record,
                       Result& result, const Result* near) {
-  const Straight straight = refine_with<InductionModel>(record, e, result, near);
+  const Iron straight = refine_with<InductionModel>(record, e, result, near);
   if (straight.largest_wb == 0.0 || result.explanation->holds) return;
-  Result saturated = saturated_start(result, straight.largest_wb);
-  const PredictorRecord whole = from_rest(record, data, e);
-  refine_with<SaturatedInductionModel>(whole, e, saturated, nullptr);
+  Result saturated = saturated_near(from_rest(record, data, e), e, result, straight.largest_wb);
   if (!saturated.explanation || !saturated.explanation->holds) return;
   if (saturated.excitation.sufficient) {
     std::ranges::move(unseen_split(saturated), std::back_inserter(saturated.excitation.unseen));

@@ -118,7 +118,9 @@ inline bool stands(const SensorNoise& noise, const SensorNoise& before) {
   return same(noise.voltage_v, before.voltage_v) && same(noise.current_a, before.current_a);
 }
 
-/// The fit in rounds; `noise` begins the first round and becomes that of the last.
+/// The fit in rounds; `noise` begins the first round and becomes that of the last. A fit that begins near has
+/// the last round alone, with the noise that it is given; a curve whose points moved explains more than the
+/// one it begins from, so its noise is found again.
 template <class Model>
 Fit fit_in_rounds(const PredictorRecord& record, const Settings& e, Predictor<Model>& predictor,
                   const std::vector<Unknown>& unknowns, Result& trial, SensorNoise& noise, bool near) {
@@ -147,7 +149,7 @@ Fit fit_in_rounds(const PredictorRecord& record, const Settings& e, Predictor<Mo
   for (int round = near ? rounds - 1 : 0; round < rounds && fit.found; ++round) {
     const SensorNoise before = noise;
     predictor.linearise(model_at(fit.at), noise);
-    if (round > 0 && !near) {
+    if (round > 0 && (!near || is_saturated(trial))) {
       noise.current_a = first.current_a;
       noise = likeliest(predictor, model_at(fit.at), noise, least, most);
     }

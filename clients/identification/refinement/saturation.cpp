@@ -30,8 +30,9 @@ Estimate unmeasured(std::string name, std::string unit, double value) {
 
 }  // namespace
 
-Result saturated_start(const Result& straight, double largest_wb) {
+Result saturated_start(const Result& straight, double largest_wb, const Result* near) {
   Result start = straight;
+  start.sensors.clear();
   start.kind = "saturated_induction";
   start.method = "induction motor with a magnetising curve, begun from a straight one";
   start.explanation.reset();
@@ -41,7 +42,9 @@ Result saturated_start(const Result& straight, double largest_wb) {
   for (int k = 1; k <= kPoints; ++k) {
     const double flux_wb = three_digits(largest_wb * sine(0.5 * std::numbers::pi * k / kPoints));
     start.curve_wb.push_back(flux_wb);
-    start.parameters.push_back(unmeasured(curve_name(flux_wb), "A", flux_wb / straight.at("M")));
+    const double current_a =
+        near != nullptr ? magnetising_curve(*near).current_a(flux_wb) : flux_wb / straight.at("M");
+    start.parameters.push_back(unmeasured(curve_name(flux_wb), "A", current_a));
   }
   start.parameters.push_back(unmeasured("split", "1", 0.0));
   for (const auto& [name, unit] : {std::pair{"R_R", "ohm"}, {"l_s", "H"}, {"l_r", "H"}})

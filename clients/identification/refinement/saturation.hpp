@@ -5,8 +5,8 @@
 namespace drivebench::identification {
 
 /// A motor with a magnetising curve near a straight one, whose curve is still a line up to this flux: five
-/// points at the places of Chebyshev, where a polynomial does not swing between them.
-Result saturated_start(const Result& straight, double largest_wb);
+/// points at the places of Chebyshev, where a polynomial does not swing between them; or the curve of `near`.
+Result saturated_start(const Result& straight, double largest_wb, const Result* near = nullptr);
 
 /// Whether the leakages of these values are above zero.
 bool is_motor(const Result& result);
