@@ -17,13 +17,18 @@
 
 namespace drivebench::identification {
 
-/// What the sensors make of the truth: gain times it, plus offset, by phase.
+/// What the sensors make of the truth: gain times it, plus offset, by phase, all phases late alike; an
+/// encoder that is late, and whose disc is off its centre.
 struct SensorErrors {
   std::array<double, 3> current_gain = {1.0, 1.0, 1.0};
   std::array<double, 3> current_offset_a{};
   std::array<double, 3> voltage_gain = {1.0, 1.0, 1.0};
   std::array<double, 3> voltage_offset_v{};
   double angle_offset_rad = 0.0;  ///< electrical, added to that of the measured shaft
+  double current_delay_s = 0.0;   ///< small: what was measured is moved on along its slope
+  double voltage_delay_s = 0.0;   ///< likewise
+  double angle_delay_s = 0.0;
+  std::array<double, 2> eccentricity_rad{};  ///< by sine and cosine of the measured angle of the shaft
 
   bool operator==(const SensorErrors&) const = default;
 };
@@ -64,7 +69,9 @@ class Flow {
   int outputs() const noexcept { return outputs_; }
   std::size_t samples() const noexcept { return r_.range.count(); }
 
-  /// The errors that the measured signals are freed of from now on.
+  /// The errors of the sensors from now on. Gains, offsets and what turns with the encoder stand in the
+  /// outputs, not in the measured signals: a gain of a measured current would move its noise with it and be
+  /// taken for smaller than it is, by the noise over the current, squared.
   void correct(const SensorErrors& errors) {
     if (!measured_.empty() && errors == errors_) return;
     errors_ = errors;
@@ -72,12 +79,13 @@ class Flow {
     voltages_.clear();
     for (std::size_t k = r_.range.first; k < r_.range.end; ++k) {
       for (std::size_t phase = 0; phase < r_.currents.size(); ++phase)
-        measured_.push_back(current(phase, k, errors));
+        measured_.push_back(current_at(phase, k, errors));
       measured_.push_back(r_.angle[k]);
       for (int place = 0; place <= 2 * substeps_; ++place) {
         std::array<double, 3> u = r_.voltages.at(k, place / (2.0 * substeps_));
+        const std::array<double, 3> late = late_voltages(k, errors.voltage_delay_s);
         for (std::size_t phase = 0; phase < u.size(); ++phase)
-          u[phase] = (u[phase] - errors.voltage_offset_v[phase]) / errors.voltage_gain[phase];
+          u[phase] = (u[phase] + late[phase] - errors.voltage_offset_v[phase]) / errors.voltage_gain[phase];
         voltages_.push_back(u);
       }
     }
@@ -102,8 +110,31 @@ class Flow {
     return r_.pole_pairs * shaft_rad + errors.angle_offset_rad;
   }
 
-  double current(std::size_t phase, std::size_t sample, const SensorErrors& errors) const noexcept {
-    return (r_.currents[phase][sample] - errors.current_offset_a[phase]) / errors.current_gain[phase];
+  /// The current of a phase as measured, at the instant that it is said to be of.
+  double current_at(std::size_t phase, std::size_t sample, const SensorErrors& errors) const noexcept {
+    const SeriesView i = r_.currents[phase];
+    if (errors.current_delay_s == 0.0) return i[sample];
+    const SampleRange near = neighbours(sample);
+    return i[sample] + errors.current_delay_s * (i[near.end] - i[near.first]) /
+                           (r_.period_s * static_cast<double>(near.count()));
+  }
+
+  /// The samples beside one, which give a slope whose noise has nothing to do with that of the sample.
+  SampleRange neighbours(std::size_t sample) const noexcept {
+    return {std::max(sample, r_.range.first + 1) - 1, std::min(sample + 1, r_.range.end - 1)};
+  }
+
+  /// What the terminals have had since the voltages of a sample were measured so much too late.
+  std::array<double, 3> late_voltages(std::size_t sample, double delay_s) const noexcept {
+    std::array<double, 3> late{};
+    if (delay_s == 0.0) return late;
+    const SampleRange near = neighbours(sample);
+    const std::array<double, 3> before = r_.voltages.at(near.first, 0.5);
+    const std::array<double, 3> after = r_.voltages.at(near.end, 0.5);
+    for (std::size_t phase = 0; phase < late.size(); ++phase)
+      late[phase] =
+          delay_s * (after[phase] - before[phase]) / (r_.period_s * static_cast<double>(near.count()));
+    return late;
   }
 
   static typename Model::State part_of(const State& x) noexcept {
@@ -122,6 +153,15 @@ class Flow {
     return 1.0;
   }
 
+  static double shown_angle(const State& x, const SensorErrors& errors) noexcept {
+    double angle = x.back() - errors.angle_delay_s * x[Model::kSpeed];
+    if (errors.eccentricity_rad != std::array<double, 2>{}) {
+      const std::complex<double> turn = phasor(x.back());
+      angle += errors.eccentricity_rad[0] * turn.imag() + errors.eccentricity_rad[1] * turn.real();
+    }
+    return angle;
+  }
+
   Values outputs(const auto& model, const State& x, const Direction& near) const noexcept {
     return outputs(model, x, near, errors_);
   }
@@ -131,8 +171,9 @@ class Flow {
     const auto i = model.currents(
         part_of(x), {.u = {}, .electrical_rad = electrical_rad, .direction = turned(near, electrical_rad)});
     Values values{};
-    std::copy(i.begin(), i.end(), values.begin());
-    values[at(outputs_ - 1)] = x.back();
+    for (std::size_t phase = 0; phase < i.size(); ++phase)
+      values[phase] = errors.current_gain[phase] * i[phase] + errors.current_offset_a[phase];
+    values[at(outputs_ - 1)] = shown_angle(x, errors);
     return values;
   }
 
@@ -223,11 +264,13 @@ class Flow {
   }
 
   /// What the motor's slope in the middle of a substep becomes by a move, less what it was.
-  Vector moved_slope(const Tangent& tangent, const Moved<Model>& m) const noexcept {
+  Vector moved_slope(const Tangent& tangent, const Moved<Model>& m, std::size_t n) const noexcept {
     std::array<double, 3> u = tangent.u;
     if (m.sensors) {
+      const std::array<double, 3> late =
+          late_voltages(r_.range.first + n, m.errors.voltage_delay_s - errors_.voltage_delay_s);
       for (std::size_t phase = 0; phase < u.size(); ++phase)
-        u[phase] = (u[phase] * errors_.voltage_gain[phase] + errors_.voltage_offset_v[phase] -
+        u[phase] = (u[phase] * errors_.voltage_gain[phase] + errors_.voltage_offset_v[phase] + late[phase] -
                     m.errors.voltage_offset_v[phase]) /
                    m.errors.voltage_gain[phase];
     }
@@ -239,10 +282,11 @@ class Flow {
                                              const Values& values) const noexcept {
     const Values there = outputs(m.model, x, direction_at(x), m.errors);
     Eigen::Vector<double, kMostOutputs> change = Eigen::Vector<double, kMostOutputs>::Zero();
+    for (int j = 0; j < outputs_; ++j)
+      change(j) = values[at(j)] - there[at(j)];
     for (std::size_t phase = 0; phase < r_.currents.size(); ++phase)
-      change(static_cast<Eigen::Index>(phase)) = current(phase, r_.range.first + n, m.errors) -
-                                                 measured_[n * at(outputs_) + phase] - there[phase] +
-                                                 values[phase];
+      change(static_cast<Eigen::Index>(phase)) +=
+          current_at(phase, r_.range.first + n, m.errors) - measured_[n * at(outputs_) + phase];
     return change;
   }
 
@@ -252,7 +296,8 @@ class Flow {
     x.back() = r_.angle[k];
     std::array<double, 3> currents{};
     for (std::size_t phase = 0; phase < r_.currents.size(); ++phase)
-      currents[phase] = current(phase, k, errors);
+      currents[phase] =
+          (current_at(phase, k, errors) - errors.current_offset_a[phase]) / errors.current_gain[phase];
     const double electrical_rad = electrical(r_.angle[k], errors);
     const auto part =
         model.state_of(currents, r_.first_speed,

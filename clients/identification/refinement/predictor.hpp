@@ -87,7 +87,7 @@ class Predictor : public Flow<Model> {
       corrected_by_gains(n, errors_at(n, values), x);
       x = followed(model, x, n, direction, [&](const Tangent& tangent) {
         for (std::size_t k = 0; k < count; ++k)
-          slopes.col(index(k)) = moved_slope(tangent, moved[k]) / difference;
+          slopes.col(index(k)) = moved_slope(tangent, moved[k], n) / difference;
         carried.noalias() = tangent.transition.lazyProduct(shift);
         carried.noalias() += tangent.growth.lazyProduct(slopes);
         shift.swap(carried);

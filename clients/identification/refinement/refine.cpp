@@ -22,6 +22,7 @@
 #include "clients/identification/refinement/rounds.hpp"
 #include "clients/identification/refinement/saturation.hpp"
 #include "clients/identification/refinement/sensor_unknowns.hpp"
+#include "clients/identification/refinement/suspects.hpp"
 #include "clients/identification/refinement/unknowns.hpp"
 #include "clients/identification/refinement/unseen.hpp"
 #include "clients/identification/refinement/verdict.hpp"
@@ -155,6 +156,24 @@ Explanation explanation_of(const Predictor<Model>& predictor, const Fit& fit, co
           .angle_error = rms(angle_errors)};
 }
 
+/// What the innovations of a fit say of the errors of the sensors that it does not look for.
+template <class Model>
+std::optional<Suspicion> suspicion_of(const Predictor<Model>& predictor, const Fit& fit,
+                                      const std::vector<Unknown>& unknowns, const Result& trial,
+                                      const PredictorRecord& record, const Settings& e) {
+  const Model model(trial, e);
+  const std::vector<Suspect> suspects = suspects_of(e, record, errors_of(trial));
+  std::vector<Moved<Model>> moved;
+  for (const Suspect& suspect : suspects)
+    moved.push_back({.model = model, .errors = suspect.errors, .sensors = true});
+  Eigen::MatrixXd directions;
+  if (!predictor.derivatives(model, moved, 1.0, directions)) return {};
+  const Eigen::Index rows = directions.rows();
+  directions.conservativeResize(fit.residual.size(), Eigen::NoChange);  // with those that no sensor moves
+  directions.bottomRows(fit.residual.size() - rows).setZero();
+  return strongest_suspicion(fit, unknowns, suspects, directions);
+}
+
 /// Why this motor does not explain the record; empty if it does.
 std::string reason_against(const Result& result, const PredictorRecord& record) {
   std::string reason = unexplained(*result.explanation, record.largest_current_a);
@@ -166,6 +185,34 @@ std::string reason_against(const Result& result, const PredictorRecord& record) 
   if (reason.empty() && is_saturated(result))
     reason = reason_against_curve(result, record.voltages.white_v(record.range));
   return reason;
+}
+
+/// Why a motor is not certified; nothing if it is.
+struct Doubt {
+  std::string reason{};  ///< that it does not explain the record
+  std::optional<Suspicion> suspicion{};
+  std::optional<BendTest> bend{};
+
+  bool any() const { return !reason.empty() || suspicion || bend; }
+};
+
+/// Of a bend and an error of a sensor, which may look alike, the one that explains more is kept.
+Doubt doubt_of(const Result& result, const PredictorRecord& record, const Iron& iron,
+               const auto& ask_sensors) {
+  std::string reason = reason_against(result, record);
+  if (!reason.empty()) return {.reason = std::move(reason)};
+  std::optional<Suspicion> suspicion = ask_sensors();
+  const bool bends = iron.bend && iron.bend->evidence > kTellsBend;
+  if (!bends) return {.suspicion = std::move(suspicion)};
+  if (suspicion && suspicion->deviations * suspicion->deviations > iron.bend->evidence)
+    return {.suspicion = std::move(suspicion)};
+  return {.bend = iron.bend};
+}
+
+Excitation refusal(const Result& result, const Doubt& doubt) {
+  if (doubt.suspicion) return verdict_on_suspicion(result, *doubt.suspicion);
+  if (doubt.bend) return verdict_on_saturation(result, *doubt.bend);
+  return verdict_against(result, doubt.reason);
 }
 
 template <class Model>
@@ -197,17 +244,13 @@ Iron refine_with(const PredictorRecord& record, const Settings& e, Result& resul
     iron = straight_of(predictor, fit, unknowns, BendingInductionModel(trial, e));
   if constexpr (std::is_same_v<Model, SaturatedInductionModel>)
     iron.largest_wb = largest_flux_wb(predictor.filtered(), record);
+  const Doubt doubt = doubt_of(result, record, iron,
+                               [&] { return suspicion_of(predictor, fit, unknowns, trial, record, e); });
   result.explanation->unlikelihood = predictor.unlikelihood(Model(trial, e), noise);
-  const std::string reason = reason_against(result, record);
-  result.explanation->holds = reason.empty();
-  set_apart(e, unknowns, reason.empty(), result);
-  if (!reason.empty()) {
-    result.excitation = verdict_against(result, reason);
-    return iron;
-  }
-  if (iron.bend && iron.bend->evidence > kTellsBend) {
-    result.explanation->holds = false;
-    result.excitation = verdict_on_saturation(result, *iron.bend);
+  result.explanation->holds = !doubt.any();
+  set_apart(e, unknowns, result.explanation->holds, result);
+  if (doubt.any()) {
+    result.excitation = refusal(result, doubt);
     return iron;
   }
   const double torque_nm = accelerating_torque(speeds, record.period_s, result.at("J"));

@@ -116,6 +116,18 @@ Excitation verdict_against(const Result& result, const std::string& reason) {
   return e;
 }
 
+Excitation verdict_on_suspicion(const Result& result, const Suspicion& suspicion) {
+  Excitation e{.sufficient = false, .unseen = names_of(result), .verdict = {}};
+  e.verdict = fmt::format(
+      "no motor of this kind explains the record as it stands: {} would explain it better, by {:.3g} "
+      "standard "
+      "deviations where noise alone passes {:.2g} once in 1,000 records, and move {} by {:.3g} of its 95 % "
+      "intervals; {}",
+      suspicion.what, suspicion.deviations, suspicion.tells, suspicion.moved, suspicion.shift,
+      suspicion.remedy);
+  return e;
+}
+
 Excitation verdict_on_open_curve(const Result& saturated) {
   Excitation e{.sufficient = false, .unseen = names_of(saturated), .verdict = {}};
   e.verdict = fmt::format(

@@ -6,6 +6,7 @@
 #include "clients/identification/data/result.hpp"
 #include "clients/identification/data/settings.hpp"
 #include "clients/identification/refinement/bend.hpp"
+#include "clients/identification/refinement/suspects.hpp"
 
 namespace drivebench::identification {
 
@@ -24,6 +25,10 @@ Excitation verdict_without_start(MotorKind kind, const Result& result);
 
 /// The verdict on a motor that does not explain its record: no parameter is stated.
 Excitation verdict_against(const Result& result, const std::string& reason);
+
+/// The verdict on a motor whose record has an error of the sensors that the fit does not look for: no
+/// parameter is stated.
+Excitation verdict_on_suspicion(const Result& result, const Suspicion& suspicion);
 
 /// The verdict on an induction motor whose iron bends and whose record leaves the curve open: no parameter is
 /// stated. `saturated` is the fit with its magnetising curve.

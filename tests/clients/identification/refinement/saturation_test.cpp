@@ -82,6 +82,15 @@ TEST(Saturation, AWrongShiftOfTheVoltagesIsNoCurve) {
   }
 }
 
+// Voltages that are late stand out of this start by 5 standard deviations, a bend by 290 in chi-squared, and
+// its curve does not explain it either. Catches: the weaker of two explanations in the verdict.
+TEST(Saturation, ABendThatExplainsMoreThanASensorIsNamed) {
+  const Saturated c(55);
+  const Result r = identify(c.run.data, c.run.how);
+  EXPECT_FALSE(r.excitation.sufficient) << to_markdown(r);
+  EXPECT_NE(r.excitation.verdict.find("the motor saturates"), std::string::npos) << r.excitation.verdict;
+}
+
 // 30 ms from the middle of a start do not tell a curve. Catches: a curve that the
 // record leaves open and the verdict states.
 TEST(Saturation, ARecordThatLeavesTheCurveOpenIsRefused) {
