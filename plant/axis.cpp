@@ -42,7 +42,7 @@ AxisCore core_of(const AxisParameters& p, AxisTiming timing, std::uint64_t seed,
               SensorBank(p.sensors, connection, timing.period_s, seed, noise,
                          timing.period_s / timing.substeps, kind_of(p.machine).field != FieldSupply::kNone),
           .comparators = Comparators(p.sensors.comparator, timing.period_s, seed, noise + kComparatorNoise),
-          .shunts = Shunts(p.sensors.shunts, timing.period_s),
+          .shunts = Shunts(p.sensors.shunts, timing.period_s, p.drive.inverter.pwm_periods_per_tick),
           .encoder = Encoder(p.encoder, timing.period_s),
           .shaft = constants_of(p.mechanics),
           .shaft_has_events = shaft_has_events(p.mechanics)};
@@ -114,7 +114,7 @@ void Axis::set_parameters(const AxisParameters& p) noexcept {
   core_.drive.set_parameters(p.drive);
   core_.sensors.set_parameters(p.sensors);
   core_.comparators.set_parameters(p.sensors.comparator);
-  core_.shunts = Shunts(p.sensors.shunts, core_.timing.period_s);
+  core_.shunts = Shunts(p.sensors.shunts, core_.timing.period_s, p.drive.inverter.pwm_periods_per_tick);
   core_.shaft = constants_of(p.mechanics);
   core_.shaft_has_events = shaft_has_events(p.mechanics);
   adjust();

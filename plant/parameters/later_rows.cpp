@@ -1,6 +1,7 @@
 #include "plant/parameters/later_rows.hpp"
 
 #include <array>
+#include <numbers>
 
 #include "plant/parameters/rows.hpp"
 
@@ -85,6 +86,9 @@ constexpr auto kTable = std::to_array<Parameter>({
                                 "B of R = R_25 exp(B (1/T - 1/298.15 K))"),
     ntc<&NtcParameters::pull_ohm>("temperature_sensor.ntc_pull_ohm", "ohm", 0, 1e9, kLater,
                                   "resistor to the reference of the converter"),
+    shunts<&ShuntParameters::sample_angle_rad>(
+        "current_sensor.sample_angle_rad", "rad", 0, 2.0 * std::numbers::pi, kLater,
+        "in place of sample_s: angle of the last PWM period of the tick; 0: sample_s says it"),
 });
 
 bool has_bits(const SensorParameters& p) noexcept {
@@ -122,6 +126,19 @@ void add_switch_problems(const DriveParameters& p, Problems& found) {
   }
 }
 
+void add_angle_problems(const AxisParameters& p, Problems& found) {
+  const ShuntParameters& s = p.sensors.shunts;
+  if (s.sample_angle_rad == 0.0) return;
+  const auto is_but = [&](std::string_view rule) {
+    found.add("current_sensor.sample_angle_rad",
+              [&] { return "is " + text(s.sample_angle_rad) + " rad but " + std::string(rule); });
+  };
+  if (p.drive.kind != DriveKind::kSwitched && p.drive.kind != DriveKind::kAveraged) {
+    is_but("must be 0 unless drive.kind is an inverter, which has a PWM period");
+  }
+  if (s.sample_s > 0.0) is_but("must be 0 where current_sensor.sample_s gives the instant");
+}
+
 void add_shunt_problems(const AxisParameters& p, Problems& found) {
   const ShuntParameters& s = p.sensors.shunts;
   const auto place = static_cast<std::size_t>(s.place);
@@ -133,25 +150,30 @@ void add_shunt_problems(const AxisParameters& p, Problems& found) {
              "\" but needs drive.kind = \"switched_inverter\" and a machine with three phases in a star";
     });
   }
-  if (s.place == ShuntPlace::kLink && !(s.sample_s > 0.0 && s.conversion_s > 0.0)) {
+  if (s.place == ShuntPlace::kLink && !(s.has_instant() && s.conversion_s > 0.0)) {
     found.add("current_sensor.place",
-              "is \"link\" but needs current_sensor.sample_s and conversion_s above 0: two instants");
+              "is \"link\" but needs current_sensor.sample_s or sample_angle_rad, and conversion_s, above 0: "
+              "two instants");
   }
-  if (s.conversion_s > 0.0 && s.sample_s == 0.0) {
+  if (s.conversion_s > 0.0 && !s.has_instant()) {
     found.add("current_sensor.conversion_s", [&] {
-      return "is " + text(s.conversion_s) + " s but must be 0 where current_sensor.sample_s is 0";
+      return "is " + text(s.conversion_s) +
+             " s but must be 0 where current_sensor.sample_s and sample_angle_rad are 0";
     });
   }
+  add_angle_problems(p, found);
   if (!s.used()) return;
   if (p.sensors.current.filter_hz > 0.0) {
     found.add("current_sensor.filter_hz", [&] {
       return "is " + text(p.sensors.current.filter_hz) +
-             " Hz but must be 0 with current_sensor.place or sample_s: the filter is that of the wires";
+             " Hz but must be 0 with current_sensor.place, sample_s or sample_angle_rad: the filter is that "
+             "of the wires";
     });
   }
   if (p.sensors.current.delay_ticks == 0.5) {
     found.add("current_sensor.delay_ticks",
-              "is 0.5 but must be whole with current_sensor.place or sample_s, which gives the instant");
+              "is 0.5 but must be whole with current_sensor.place, sample_s or sample_angle_rad, which give "
+              "the instant");
   }
 }
 
@@ -200,13 +222,16 @@ void add_later_problems(const AxisParameters& p, Problems& found) {
   }
 }
 
-void add_period_problems(const SensorParameters& p, double period_s, Problems& found) {
-  const ShuntParameters& s = p.shunts;
-  const double last_s = s.sample_s + (s.place == ShuntPlace::kLink ? 1.0 : 2.0) * s.conversion_s;
+void add_period_problems(const AxisParameters& p, double period_s, Problems& found) {
+  const ShuntParameters& s = p.sensors.shunts;
+  const std::size_t last = s.place == ShuntPlace::kLink ? 1 : 2;
+  const double last_s = s.instant_s(last, period_s, p.drive.inverter.pwm_periods_per_tick);
   if (last_s <= period_s) return;
-  found.add("current_sensor.sample_s", [&] {
-    return "is " + text(s.sample_s) + " s: the last conversion at " + text(last_s) +
-           " s must lie within the tick, which is " + text(period_s) + " s";
+  const bool by_angle = s.sample_angle_rad > 0.0;
+  found.add(by_angle ? "current_sensor.sample_angle_rad" : "current_sensor.sample_s", [&] {
+    return "is " + (by_angle ? text(s.sample_angle_rad) + " rad" : text(s.sample_s) + " s") +
+           ": the last conversion at " + text(last_s) + " s must lie within the tick, which is " +
+           text(period_s) + " s";
   });
 }
 

@@ -14,6 +14,6 @@ std::span<const Parameter> later_rows() noexcept;
 void add_later_problems(const AxisParameters& p, Problems& found);
 
 /// The rules with the sample period.
-void add_period_problems(const SensorParameters& p, double period_s, Problems& found);
+void add_period_problems(const AxisParameters& p, double period_s, Problems& found);
 
 }  // namespace drivebench

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <numbers>
 
 #include "plant/parameters/later_rows.hpp"
 #include "plant/parameters/parameters.hpp"
@@ -47,6 +48,53 @@ TEST(Shunts, AConversionTakesTheCurrentOfItsInstant) {
     }
   }
   EXPECT_NEAR(after_one_tick({.sample_s = kTick_s}, kBothLow, 20.0).i_a_a, falling(20.0, kTick_s), 1e-10);
+}
+
+// With two PWM periods in a tick of 50 us the last one begins at 25 us: its peak is at 37.5 us. Catches: an
+// angle of the tick or of the first period, a peak at 2 pi, degrees.
+TEST(Shunts, AnAngleIsThatOfTheLastPeriodOfTheTick) {
+  const auto converted_a = [](const ShuntParameters& shunts, int pwm_periods) {
+    AxisParameters p = standing_motor();
+    p.drive.inverter.pwm_periods_per_tick = pwm_periods;
+    p.sensors.shunts = shunts;
+    EXPECT_TRUE(problems(p).empty());
+    Axis axis(p, kTiming, 1, 0);
+    set_line_current(axis, 20.0);
+    axis.advance(kBothLow, 0);
+    return axis.sample(1).i_a_a;
+  };
+  for (const int pwm_periods : {1, 2}) {
+    const double begin_s = kTick_s - kTick_s / pwm_periods;
+    for (const double part : {0.1, 0.5, 0.75, 1.0}) {
+      const double angle_rad = part * 2.0 * std::numbers::pi;
+      const double at_s = begin_s + part * kTick_s / pwm_periods;
+      EXPECT_NEAR(converted_a({.sample_angle_rad = angle_rad}, pwm_periods), falling(20.0, at_s), 1e-10);
+    }
+  }
+}
+
+// Catches: an angle that rounds to another instant than its nanoseconds do, one that stays where it was when
+// the PWM has another period.
+TEST(Shunts, AnAngleFollowsThePeriodOfThePwm) {
+  for (const double period_s : {0.5 * kTick_s, kTick_s, 2.0 * kTick_s}) {
+    AxisParameters p = standing_motor();
+    p.sensors.shunts = {.sample_s = 0.75 * period_s};
+    Axis by_time(p, {.period_s = period_s, .substeps = 16}, 1, 0);
+    p.sensors.shunts = {.sample_angle_rad = 1.5 * std::numbers::pi};
+    Axis by_angle(p, {.period_s = period_s, .substeps = 16}, 1, 0);
+    for (Axis* const axis : {&by_time, &by_angle}) {
+      set_line_current(*axis, 20.0);
+      axis->advance(kBothLow, 0);
+    }
+    EXPECT_EQ(by_angle.sample(1).i_a_a, by_time.sample(1).i_a_a);
+    // Steps of 6.25 us err by 2e-9 A, of which the current falls 0.1 ps.
+    EXPECT_NEAR(by_angle.sample(1).i_a_a, falling(20.0, 0.75 * period_s), 5e-9);
+    p.drive.inverter.pwm_periods_per_tick = 2;
+    by_angle.set_parameters(p);
+    const double begun_a = currents(by_angle)[0];
+    by_angle.advance(kBothLow, 1);
+    EXPECT_NEAR(by_angle.sample(2).i_a_a, falling(begun_a, 0.875 * period_s), 5e-9);
+  }
 }
 
 // Leg a is high from 10 us to 40 us. Catches: a shunt that sees the current of the upper switch, that is
@@ -120,25 +168,25 @@ TEST(Shunts, TheRulesNameTheFieldAndTheReason) {
   };
   AxisParameters p = standing_motor();
   p.sensors.shunts.place = ShuntPlace::kLink;
-  EXPECT_EQ(
-      only(p),
-      "current_sensor.place is \"link\" but needs current_sensor.sample_s and conversion_s above 0: two "
-      "instants");
+  EXPECT_EQ(only(p),
+            "current_sensor.place is \"link\" but needs current_sensor.sample_s or sample_angle_rad, and "
+            "conversion_s, above 0: two instants");
   p.sensors.shunts = {.conversion_s = 1e-6};
   EXPECT_EQ(only(p),
-            "current_sensor.conversion_s is 1e-06 s but must be 0 where current_sensor.sample_s is 0");
+            "current_sensor.conversion_s is 1e-06 s but must be 0 where current_sensor.sample_s and "
+            "sample_angle_rad are 0");
   p.sensors.shunts = {.sample_s = 5e-6};
   p.sensors.current.filter_hz = 1e4;
-  EXPECT_EQ(
-      only(p),
-      "current_sensor.filter_hz is 10000 Hz but must be 0 with current_sensor.place or sample_s: the filter "
-      "is that of the wires");
+  EXPECT_EQ(only(p),
+            "current_sensor.filter_hz is 10000 Hz but must be 0 with current_sensor.place, sample_s or "
+            "sample_angle_rad: the filter "
+            "is that of the wires");
   p.sensors.current.filter_hz = 0.0;
   p.sensors.current.delay_ticks = 0.5;
-  EXPECT_EQ(
-      only(p),
-      "current_sensor.delay_ticks is 0.5 but must be whole with current_sensor.place or sample_s, which "
-      "gives the instant");
+  EXPECT_EQ(only(p),
+            "current_sensor.delay_ticks is 0.5 but must be whole with current_sensor.place, sample_s or "
+            "sample_angle_rad, which "
+            "give the instant");
   p = standing_motor();
   p.sensors.shunts.place = ShuntPlace::kLowSide;
   p.drive.kind = DriveKind::kAveraged;
@@ -146,9 +194,27 @@ TEST(Shunts, TheRulesNameTheFieldAndTheReason) {
       only(p),
       "current_sensor.place is \"low_side\" but needs drive.kind = \"switched_inverter\" and a machine with "
       "three phases in a star");
+  p.sensors.shunts = {.sample_s = 5e-6, .sample_angle_rad = 3.0};
+  EXPECT_EQ(only(p),
+            "current_sensor.sample_angle_rad is 3 rad but must be 0 where current_sensor.sample_s gives the "
+            "instant");
+  p.sensors.shunts = {.sample_angle_rad = 3.0};
+  p.drive.kind = DriveKind::kVoltage;
+  EXPECT_EQ(only(p),
+            "current_sensor.sample_angle_rad is 3 rad but must be 0 unless drive.kind is an inverter, which "
+            "has a PWM period");
   std::vector<Problem> found;
   Problems rules(found);
-  add_period_problems(SensorParameters{.shunts = {.sample_s = 49e-6, .conversion_s = 1e-6}}, kTick_s, rules);
+  p.sensors.shunts = {.sample_angle_rad = 3.0, .conversion_s = 14e-6};
+  add_period_problems(p, kTick_s, rules);
+  ASSERT_EQ(found.size(), 1u);
+  EXPECT_EQ(
+      found[0].field + " " + found[0].rule,
+      "current_sensor.sample_angle_rad is 3 rad: the last conversion at 5.18732414637843e-05 s must lie "
+      "within the tick, which is 5e-05 s");
+  found.clear();
+  p.sensors.shunts = {.sample_s = 49e-6, .conversion_s = 1e-6};
+  add_period_problems(p, kTick_s, rules);
   ASSERT_EQ(found.size(), 1u);
   EXPECT_EQ(
       found[0].field + " " + found[0].rule,

@@ -62,7 +62,7 @@ void check_step(StrictTable& bench, const BenchSetup& setup, const AxisReading& 
   std::vector<Problem> found;
   Problems rules(found);
   add_period_problems(axis.setup.parameters.drive, period_s, rules);
-  add_period_problems(axis.setup.parameters.sensors, period_s, rules);
+  add_period_problems(axis.setup.parameters, period_s, rules);
   for (const Problem& problem : found) {
     bench.report("period_us",
                  "does not suit axis \"" + axis.config.name + "\": " + problem.field + " " + problem.rule);

@@ -161,6 +161,13 @@ BenchConfig bench_with_board() {
   return config;
 }
 
+/// The same with conversions by the angle of the PWM.
+BenchConfig bench_with_angle() {
+  BenchConfig config = bench_with_board();
+  config.setup.axes[0].parameters.sensors.shunts = {.sample_angle_rad = 3.0};
+  return config;
+}
+
 /// The same behind a transformer, whose values mean nothing alone.
 BenchConfig bench_with_transformer() {
   BenchConfig config = bench_with_room();
@@ -192,16 +199,18 @@ TEST(Config, EveryRowOfTheParameterTableHasAKeyOfItsOwn) {
   const BenchConfig transformer = bench_with_transformer();
   const BenchConfig star = bench_with_star();
   const BenchConfig board = bench_with_board();
+  const BenchConfig angle = bench_with_angle();
   const auto is_of_board = [](const Parameter& row) {
     return row.later && (row.name.starts_with("inverter.") || row.name.starts_with("current_sensor.") ||
                          row.name.starts_with("temperature_sensor."));
   };
   std::string alone;
   for (const Parameter& row : axis_parameters(room.setup.axes[0].parameters)) {
-    const BenchConfig& base = row.name.starts_with("transformer.")  ? transformer
-                              : row.name.starts_with("comparator.") ? star
-                              : is_of_board(row)                    ? board
-                                                                    : room;
+    const BenchConfig& base = row.name.starts_with("transformer.")            ? transformer
+                              : row.name.starts_with("comparator.")           ? star
+                              : row.name == "current_sensor.sample_angle_rad" ? angle
+                              : is_of_board(row)                              ? board
+                                                                              : room;
     if (const auto config = with_another_value(base, row)) {
       expect_equal(parse(to_toml(*config)), *config);
       EXPECT_NE(to_toml(*config), to_toml(base)) << row.name;
