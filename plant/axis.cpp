@@ -44,6 +44,8 @@ AxisCore core_of(const AxisParameters& p, AxisTiming timing, std::uint64_t seed,
           .comparators = Comparators(p.sensors.comparator, timing.period_s, seed, noise + kComparatorNoise),
           .shunts = Shunts(p.sensors.shunts, timing.period_s, p.drive.inverter.pwm_periods_per_tick),
           .encoder = Encoder(p.encoder, timing.period_s),
+          .absolute = AbsoluteEncoder(p.sensors.absolute, timing.period_s),
+          .hall = HallCapture(p.sensors.hall, pole_pairs_of(p.machine), timing.period_s),
           .shaft = constants_of(p.mechanics),
           .shaft_has_events = shaft_has_events(p.mechanics)};
 }
@@ -94,6 +96,8 @@ Axis::Axis(const AxisParameters& p, AxisTiming timing, std::uint64_t seed, std::
   state_.sensors =
       core_.sensors.settled({.bus_v = state_.drive.bus_v, .temperature_k = state_.thermal.temperature_k}, 0);
   state_.comparators = core_.comparators.settled(state_.drive.bus_v);
+  state_.absolute = core_.absolute.settled(0.0);
+  state_.hall = core_.hall.settled();
 }
 
 Axis::Axis(const Axis& other)
@@ -115,6 +119,7 @@ void Axis::set_parameters(const AxisParameters& p) noexcept {
   core_.sensors.set_parameters(p.sensors);
   core_.comparators.set_parameters(p.sensors.comparator);
   core_.shunts = Shunts(p.sensors.shunts, core_.timing.period_s, p.drive.inverter.pwm_periods_per_tick);
+  core_.hall = HallCapture(p.sensors.hall, core_.pole_pairs, core_.timing.period_s);
   core_.shaft = constants_of(p.mechanics);
   core_.shaft_has_events = shaft_has_events(p.mechanics);
   adjust();
@@ -187,6 +192,16 @@ void Axis::begin_break() noexcept {
   core_.breaks = m.pending != 0 || watches_break(core_, state_);
 }
 
+/// What the sensors of the position see of the last segments.
+void Axis::follow_rotor() noexcept {
+  const std::span<const AngleSegment> segments = last_tick();
+  core_.encoder.follow(state_.encoder, segments, core_.tick, core_.last_tick_turn, state_.injected);
+  if (core_.absolute.enabled()) core_.absolute.follow(state_.absolute, segments);
+  if (core_.hall.enabled()) {
+    core_.hall.follow(state_.hall, segments, core_.tick, core_.last_tick_turn, state_.injected);
+  }
+}
+
 double Axis::load_at(Tick tick) const noexcept {
   const double load_nm = state_.load.at(tick);
   if (core_.p.mechanics.load_profile.empty()) return load_nm;
@@ -214,7 +229,8 @@ PhaseValues Axis::sensed_currents() const noexcept {
 void Axis::end_tick(const MotionState& before, Tick tick) noexcept {
   if (!finite()) return hold(before);
   if (state_.drive.saturated != 0.0) state_.faults |= kVoltageSaturated;
-  core_.encoder.follow(state_.encoder, last_tick(), tick, core_.last_tick_turn, state_.injected);
+  follow_rotor();
+  if (core_.absolute.enabled()) core_.absolute.end_tick(state_.absolute, tick + 1);
   if (core_.shaft_has_events && state_.shaft.speed_rad_s == 0.0) state_.faults |= kShaftHeld;
   wrap_angle(state_);
   forget_negligible(state_);
@@ -336,6 +352,8 @@ Sample Axis::sample(Tick tick) const noexcept {
   core_.comparators.read(state_.comparators, tick, s);
   s.encoder_timer = core_.encoder.timer(state_.encoder);
   s.encoder_capture = core_.encoder.capture(state_.encoder);
+  if (core_.absolute.enabled()) s.absolute_angle = core_.absolute.read(state_.absolute, state_.sensors.tick);
+  if (core_.hall.enabled()) core_.hall.read(state_.hall, tick, s);
   return s;
 }
 

@@ -21,12 +21,12 @@ bool Axis::run_part(const LegLevels& levels, double start_s, double end_s) noexc
   look_inside();
   check_over_current(core_, state_,
                      terminal_currents(core_.connection, truth_.current_a, state_.open_terminals));
-  core_.encoder.follow(state_.encoder, last_tick(), core_.tick, core_.last_tick_turn, state_.injected);
+  follow_rotor();
   return true;
 }
 
 void Axis::close_tick() noexcept {
-  core_.segment_count = 0;  // the encoder has followed them
+  core_.segment_count = 0;  // the sensors of the position have followed them
   end_tick(motion(), core_.tick);
 }
 

@@ -10,8 +10,10 @@
 #include "plant/injected_faults.hpp"
 #include "plant/mechanics/load.hpp"
 #include "plant/mechanics/shaft.hpp"
+#include "plant/sensors/absolute_encoder.hpp"
 #include "plant/sensors/comparators.hpp"
 #include "plant/sensors/encoder.hpp"
+#include "plant/sensors/hall.hpp"
 #include "plant/sensors/sensor_bank.hpp"
 #include "plant/thermal.hpp"
 
@@ -53,6 +55,9 @@ struct AxisState {
   // Later still, and zero without a break input and with currents that are measured in the wires.
   BreakMemory break_input{};
   ShuntMemory shunts{};
+  // Later still, each zero where it is not configured.
+  AbsoluteMemory absolute{};
+  HallMemory hall{};
 };
 
 }  // namespace drivebench

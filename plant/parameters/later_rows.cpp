@@ -24,6 +24,10 @@ constexpr auto inverter = row<&AxisParameters::drive, &DriveParameters::inverter
 template <auto Member>
 constexpr auto ntc = row<&AxisParameters::sensors, &SensorParameters::ntc, Member>;
 template <auto Member>
+constexpr auto absolute = row<&AxisParameters::sensors, &SensorParameters::absolute, Member>;
+template <auto Member>
+constexpr auto hall = row<&AxisParameters::sensors, &SensorParameters::hall, Member>;
+template <auto Member>
 constexpr auto shunts = row<&AxisParameters::sensors, &SensorParameters::shunts, Member>;
 
 using Comparator = ComparatorParameters;
@@ -32,11 +36,11 @@ using Inverter = InverterParameters;
 constexpr auto kTable = std::to_array<Parameter>({
     row<&AxisParameters::sensors, &SensorParameters::terminals>(
         "voltage_sensor.against_rail", "1", 0, 1, kInteger | kLater,
-        "1: terminals against the negative rail, too: terminal_a_v and so on"),
+        "1: terminal_a_v and so on, against the negative rail"),
     row<&AxisParameters::drive, &DriveParameters::bus, &BusParameters::battery>(
         "bus.battery", "1", 0, 1, kInteger | kLater, "1: the supply takes current back; 0: a rectifier"),
     comparator_row<&Comparator::enabled>("comparator.enabled", "1", 0, 1, kInteger,
-                                         "1: comparators of the terminals, comparator_levels and so on"),
+                                         "1: comparators of the terminals"),
     choice(comparator_row<&Comparator::reference>("comparator.reference", "1", 0, 0, kInteger,
                                                   "what a terminal is compared with"),
            kReferences),
@@ -44,26 +48,24 @@ constexpr auto kTable = std::to_array<Parameter>({
                                              "against the negative rail, with reference = \"fixed\""),
     comparator_row<&Comparator::rc_s>("comparator.rc_s", "s", 0, 1, kLive,
                                       "time constant of the RC of terminal and reference; 0: none"),
-    comparator_row<&Comparator::hysteresis_v>(
-        "comparator.hysteresis_v", "V", 0, 1e6, kLive,
-        "it rises above half of it, falls below minus half; at the terminal"),
+    comparator_row<&Comparator::hysteresis_v>("comparator.hysteresis_v", "V", 0, 1e6, kLive,
+                                              "the level changes at plus and minus half of it"),
     comparator_row<&Comparator::offset_a_v>("comparator.offset_a_v", "V", -1e6, 1e6, kLive,
-                                            "added to what the comparator of a sees"),
+                                            "added to the input of a"),
     comparator_row<&Comparator::offset_b_v>("comparator.offset_b_v", "V", -1e6, 1e6, kLive,
-                                            "added to what the comparator of b sees"),
+                                            "added to the input of b"),
     comparator_row<&Comparator::offset_c_v>("comparator.offset_c_v", "V", -1e6, 1e6, kLive,
-                                            "added to what the comparator of c sees"),
+                                            "added to the input of c"),
     comparator_row<&Comparator::noise_rms_v>("comparator.noise_rms_v", "V", 0, 1e6, kLive,
-                                             "Gaussian, new each microsecond, in each comparator its own"),
+                                             "Gaussian, new each microsecond, in each its own"),
     row<&AxisParameters::sensors, &SensorParameters::counts>(
         "converter.counts", "1", 0, 1, kInteger | kLater,
-        "1: converters show their numbers, too: i_a_counts and so on, 2^(bits - 1) for 0"),
+        "1: numbers of the converters, i_a_counts and so on"),
     row<&AxisParameters::encoder, &EncoderParameters::timer_bits>(
         "encoder.timer_bits", "bit", 0, 32, kInteger | kLater,
-        "of the timers of encoder_timer and encoder_capture; 0: there are none"),
-    row<&AxisParameters::encoder, &EncoderParameters::capture_hz>(
-        "encoder.capture_hz", "Hz", 0, 1e9, kLater,
-        "clock of the timer of encoder_capture, between edges; 0: none"),
+        "of encoder_timer and encoder_capture; 0: none"),
+    row<&AxisParameters::encoder, &EncoderParameters::capture_hz>("encoder.capture_hz", "Hz", 0, 1e9, kLater,
+                                                                  "clock of encoder_capture; 0: none"),
     inverter<&Inverter::switch_ohm>("inverter.switch_ohm", "ohm", 0, 1e3, kLive | kLater,
                                     "R_ds(on) of a closed switch"),
     inverter<&Inverter::diode_v>("inverter.diode_v", "V", 0, 100, kLive | kLater,
@@ -74,21 +76,30 @@ constexpr auto kTable = std::to_array<Parameter>({
                                        "from the cause until the legs are open"),
     choice(shunts<&ShuntParameters::place>(
                "current_sensor.place", "1", 0, 0, kInteger | kLater,
-               "inline: wires; low_side: lower switches; link: i_a and i_b are two conversions of the link"),
+               "inline: wires; low_side: lower switches; link: i_a and i_b are conversions of it"),
            kShuntPlaces),
     shunts<&ShuntParameters::sample_s>("current_sensor.sample_s", "s", 0, 1, kLater,
                                        "first conversion, in the tick before the sample; 0: at its end"),
     shunts<&ShuntParameters::conversion_s>("current_sensor.conversion_s", "s", 0, 1, kLater,
                                            "from one conversion to the next; 0: all at once"),
     ntc<&NtcParameters::ohm>("temperature_sensor.ntc_ohm", "ohm", 0, 1e9, kLater,
-                             "thermistor at 25 degrees Celsius, for temperature_counts; 0: none"),
+                             "thermistor at 25 degrees Celsius; 0: none"),
     ntc<&NtcParameters::beta_k>("temperature_sensor.ntc_beta_k", "K", 0, 1e5, kLater,
                                 "B of R = R_25 exp(B (1/T - 1/298.15 K))"),
     ntc<&NtcParameters::pull_ohm>("temperature_sensor.ntc_pull_ohm", "ohm", 0, 1e9, kLater,
                                   "resistor to the reference of the converter"),
-    shunts<&ShuntParameters::sample_angle_rad>(
-        "current_sensor.sample_angle_rad", "rad", 0, 2.0 * std::numbers::pi, kLater,
-        "in place of sample_s: angle of the last PWM period of the tick; 0: sample_s says it"),
+    shunts<&ShuntParameters::sample_angle_rad>("current_sensor.sample_angle_rad", "rad", 0,
+                                               2.0 * std::numbers::pi, kLater,
+                                               "in place of sample_s: angle of the PWM period; 0: none"),
+    absolute<&AbsoluteEncoderParameters::bits>("absolute_encoder.bits", "bit", 0, kMaxAbsoluteBits,
+                                               kInteger | kLater, "of absolute_angle; 0: none"),
+    absolute<&AbsoluteEncoderParameters::latency_s>("absolute_encoder.latency_s", "s", 0, 1, kLater,
+                                                    "age of the angle"),
+    absolute<&AbsoluteEncoderParameters::offset_rad>("absolute_encoder.offset_rad", "rad", -6.3, 6.3, kLater,
+                                                     "added to the angle"),
+    hall<&HallParameters::capture_bits>("hall.capture_bits", "bit", 0, 32, kInteger | kLater,
+                                        "of hall_capture; 0: none"),
+    hall<&HallParameters::capture_hz>("hall.capture_hz", "Hz", 0, 1e9, kLater, "clock of hall_capture"),
 });
 
 bool has_bits(const SensorParameters& p) noexcept {
@@ -123,6 +134,29 @@ void add_switch_problems(const DriveParameters& p, Problems& found) {
   }
   if (p.kind != DriveKind::kSwitched && p.kind != DriveKind::kAveraged && p.inverter.break_current_a != 0.0) {
     needs("inverter.break_current_a", p.inverter.break_current_a, "unless drive.kind is an inverter");
+  }
+}
+
+void add_position_problems(const SensorParameters& p, Problems& found) {
+  if (p.absolute.bits == 0 && p.absolute.latency_s > 0.0) {
+    found.add("absolute_encoder.latency_s", [&] {
+      return "is " + text(p.absolute.latency_s) + " s but needs absolute_encoder.bits above 0, which is 0";
+    });
+  }
+  if (p.absolute.bits == 0 && p.absolute.offset_rad != 0.0) {
+    found.add("absolute_encoder.offset_rad", [&] {
+      return "is " + text(p.absolute.offset_rad) + " rad but needs absolute_encoder.bits above 0, which is 0";
+    });
+  }
+  const bool clocked = p.hall.capture_hz > 0.0;
+  if (clocked != (p.hall.capture_bits > 0)) {
+    found.add("hall.capture_hz", [&] {
+      return "is " + text(p.hall.capture_hz) + " Hz and hall.capture_bits " + text(p.hall.capture_bits) +
+             ": both must be above 0, or none";
+    });
+  } else if (clocked && !p.hall.enabled) {
+    found.add("hall.capture_bits",
+              [&] { return "is " + text(p.hall.capture_bits) + " but needs hall.enabled = 1, which is 0"; });
   }
 }
 
@@ -210,6 +244,7 @@ void add_later_problems(const AxisParameters& p, Problems& found) {
   add_switch_problems(p.drive, found);
   add_shunt_problems(p, found);
   add_ntc_problems(p.sensors, found);
+  add_position_problems(p.sensors, found);
   if (p.sensors.counts && !has_bits(p.sensors)) {
     found.add("converter.counts",
               "is 1 but no converter has bits: current_sensor.bits, or voltage_sensor, bus_sensor or "
@@ -222,7 +257,9 @@ void add_later_problems(const AxisParameters& p, Problems& found) {
   }
 }
 
-void add_period_problems(const AxisParameters& p, double period_s, Problems& found) {
+namespace {
+
+void add_conversion_problems(const AxisParameters& p, double period_s, Problems& found) {
   const ShuntParameters& s = p.sensors.shunts;
   const std::size_t last = s.place == ShuntPlace::kLink ? 1 : 2;
   const double last_s = s.instant_s(last, period_s, p.drive.inverter.pwm_periods_per_tick);
@@ -232,6 +269,19 @@ void add_period_problems(const AxisParameters& p, double period_s, Problems& fou
     return "is " + (by_angle ? text(s.sample_angle_rad) + " rad" : text(s.sample_s) + " s") +
            ": the last conversion at " + text(last_s) + " s must lie within the tick, which is " +
            text(period_s) + " s";
+  });
+}
+
+}  // namespace
+
+void add_period_problems(const AxisParameters& p, double period_s, Problems& found) {
+  add_conversion_problems(p, period_s, found);
+  const double latency_s = p.sensors.absolute.latency_s;
+  const double most_s = kMaxSensorDelayTicks * period_s;
+  if (latency_s <= most_s) return;
+  found.add("absolute_encoder.latency_s", [&] {
+    return "is " + text(latency_s) + " s but may be at most " + text(kMaxSensorDelayTicks) + " ticks, " +
+           text(most_s) + " s";
   });
 }
 

@@ -34,8 +34,8 @@ constexpr Parameter thermal_row(std::string_view name, std::string_view unit, do
   return row<&AxisParameters::thermal, Member>(name, unit, minimum, maximum, traits, meaning);
 }
 
-constexpr std::string_view kDelayMeaning = "age of the sample: 0, 0.5 or a whole number";
-constexpr std::string_view kFilterMeaning = "corner of the first-order anti-alias filter; 0: none";
+constexpr std::string_view kDelayMeaning = "age of the sample: 0, 0.5 or whole";
+constexpr std::string_view kFilterMeaning = "corner of a first-order filter; 0: none";
 
 constexpr auto kEncoder = std::to_array<Parameter>({
     encoder_row<&EncoderParameters::counts_per_revolution>("encoder.counts_per_revolution", "counts", 4,
@@ -51,9 +51,9 @@ constexpr auto kEncoder = std::to_array<Parameter>({
 
 constexpr auto kCurrentSensor = std::to_array<Parameter>({
     sensor_row<&SensorParameters::current, &Current::bits>("current_sensor.bits", "bit", 0, 24, kInteger,
-                                                           "converter resolution; 0: ideal"),
-    sensor_row<&SensorParameters::current, &Current::full_scale_a>(
-        "current_sensor.full_scale_a", "A", 1e-6, 1e6, kReal, "range -full_scale .. +full_scale"),
+                                                           "of the converter; 0: ideal"),
+    sensor_row<&SensorParameters::current, &Current::full_scale_a>("current_sensor.full_scale_a", "A", 1e-6,
+                                                                   1e6, kReal, "plus and minus this"),
     sensor_row<&SensorParameters::current, &Current::gain_a>("current_sensor.gain_a", "1", -100, 100, kLive,
                                                              "gain of phase a"),
     sensor_row<&SensorParameters::current, &Current::gain_b>("current_sensor.gain_b", "1", -100, 100, kLive,
@@ -91,9 +91,9 @@ constexpr std::array<Parameter, 8> analog_rows(const AnalogNames& name, std::str
                                                std::string_view enabled_meaning) {
   return {
       sensor_row<Path..., &Analog::enabled>(name.enabled, "1", 0, 1, kInteger, enabled_meaning),
-      sensor_row<Path..., &Analog::bits>(name.bits, "bit", 0, 24, kInteger, "converter resolution; 0: ideal"),
+      sensor_row<Path..., &Analog::bits>(name.bits, "bit", 0, 24, kInteger, "of the converter; 0: ideal"),
       sensor_row<Path..., &Analog::full_scale>(name.full_scale, unit, 1e-6, 1e6, kReal,
-                                               "range -full_scale .. +full_scale"),
+                                               "plus and minus this"),
       sensor_row<Path..., &Analog::gain>(name.gain, "1", -100, 100, kLive, "reading over true value"),
       sensor_row<Path..., &Analog::offset>(name.offset, unit, -1e6, 1e6, kLive, "added to the reading"),
       sensor_row<Path..., &Analog::noise_rms>(name.noise_rms, unit, 0, 1e6, kLive, "Gaussian"),

@@ -17,15 +17,15 @@ constexpr auto kTable = std::to_array<Parameter>({
         "transformer.turns_ratio", "1", 0, 1e4, kReal,
         "secondary over primary, of a transformer in each phase of a source; 0: none"),
     transformer<&Transformer::primary_resistance_ohm>("transformer.primary_resistance_ohm", "ohm", 0, 1e6,
-                                                      kLive, "of the winding on the side of the source"),
+                                                      kLive, "of the winding at the source"),
     transformer<&Transformer::primary_leakage_h>("transformer.primary_leakage_h", "H", 0, 1e3, kReal,
-                                                 "of the winding on the side of the source"),
+                                                 "of the winding at the source"),
     transformer<&Transformer::magnetising_inductance_h>("transformer.magnetising_inductance_h", "H", 0, 1e6,
-                                                        kReal, "seen from the side of the source"),
+                                                        kReal, "seen from the source"),
     transformer<&Transformer::secondary_resistance_ohm>("transformer.secondary_resistance_ohm", "ohm", 0, 1e6,
-                                                        kLive, "of the winding on the side of the machine"),
+                                                        kLive, "of the winding at the machine"),
     transformer<&Transformer::secondary_leakage_h>("transformer.secondary_leakage_h", "H", 0, 1e3, kReal,
-                                                   "of the winding on the side of the machine"),
+                                                   "of the winding at the machine"),
 });
 
 bool has_values(const Transformer& t) noexcept {

@@ -1,6 +1,5 @@
 #include "plant/sensors/encoder.hpp"
 
-#include <algorithm>
 #include <cmath>
 #include <numbers>
 
@@ -9,31 +8,10 @@
 namespace drivebench {
 namespace {
 
-/// The cubic on s in [0, 1] with the given end values and end slopes.
-struct Hermite {
-  double constant, linear, quadratic, cubic;
-
-  Hermite(double start, double end, double start_slope, double end_slope) noexcept
-      : constant(start),
-        linear(start_slope),
-        quadratic(3.0 * (end - start) - 2.0 * start_slope - end_slope),
-        cubic(2.0 * (start - end) + start_slope + end_slope) {}
-
-  double value(double s) const noexcept { return constant + s * (linear + s * (quadratic + s * cubic)); }
-  double slope(double s) const noexcept { return linear + s * (2.0 * quadratic + s * 3.0 * cubic); }
-};
-
 /// floor(count / divisor) for a positive divisor.
 std::int64_t floor_divide(std::int64_t count, std::int64_t divisor) noexcept {
   const std::int64_t quotient = count / divisor;
   return quotient - (count % divisor < 0 ? 1 : 0);
-}
-
-/// Fritsch and Carlson: end slopes between 0 and 3 times the mean slope make the cubic monotonic.
-bool is_monotonic(double rise, double start_slope, double end_slope) noexcept {
-  const double limit = 3.0 * std::abs(rise);
-  return start_slope * rise >= 0.0 && end_slope * rise >= 0.0 && std::abs(start_slope) <= limit &&
-         std::abs(end_slope) <= limit;
 }
 
 }  // namespace
@@ -50,77 +28,6 @@ double Encoder::position(double angle_rad) const noexcept {
 
 std::int64_t Encoder::count_at(double angle_rad, std::int64_t turn) const noexcept {
   return turn * p_.counts_per_revolution + floor_to_integer(position(angle_rad));
-}
-
-Encoder::Piece Encoder::part(const Piece& whole, double from, double to) noexcept {
-  const Hermite curve(whole.start, whole.end, whole.start_slope, whole.end_slope);
-  const double width = to - from;
-  return {.start_s = whole.start_s + from * whole.duration_s,
-          .duration_s = width * whole.duration_s,
-          .start = from == 0.0 ? whole.start : curve.value(from),
-          .end = to == 1.0 ? whole.end : curve.value(to),
-          .start_slope = curve.slope(from) * width,
-          .end_slope = curve.slope(to) * width};
-}
-
-Encoder::Piece Encoder::piece_of(const AngleSegment& segment) const noexcept {
-  const double slope_scale = counts_per_rad_ * segment.duration_s;
-  return {.start_s = segment.start_s,
-          .duration_s = segment.duration_s,
-          .start = position(segment.start_rad),
-          .end = position(segment.end_rad),
-          .start_slope = segment.start_rad_s * slope_scale,
-          .end_slope = segment.end_rad_s * slope_scale};
-}
-
-Encoder::Pieces Encoder::monotonic_pieces(const AngleSegment& segment) const noexcept {
-  const Piece whole = piece_of(segment);
-  if (is_monotonic(whole.end - whole.start, whole.start_slope, whole.end_slope)) return {{whole}, 1};
-
-  const Hermite curve(whole.start, whole.end, whole.start_slope, whole.end_slope);
-  const double a = 3.0 * curve.cubic;
-  const double b = curve.quadratic;  // half of the linear coefficient of the slope
-  const double c = curve.linear;
-  const double discriminant = b * b - a * c;
-  std::array<double, 4> cut{0.0};
-  std::size_t cuts = 1;
-  if (discriminant > 0.0) {
-    const double q = -(b + std::copysign(std::sqrt(discriminant), b));
-    const std::array<double, 2> root{a != 0.0 ? q / a : -1.0, q != 0.0 ? c / q : -1.0};
-    for (const double s : {std::min(root[0], root[1]), std::max(root[0], root[1])}) {
-      if (s > cut[cuts - 1] && s < 1.0) cut[cuts++] = s;
-    }
-  }
-  cut[cuts] = 1.0;
-  Pieces result{{}, static_cast<int>(cuts)};
-  for (std::size_t i = 0; i < cuts; ++i)
-    result.piece[i] = part(whole, cut[i], cut[i + 1]);
-  return result;
-}
-
-double Encoder::time_of(const Piece& piece, double boundary) noexcept {
-  const Hermite curve(piece.start, piece.end, piece.start_slope, piece.end_slope);
-  if (piece.end == piece.start) return piece.start_s;  // a count that only rounding at the wrap has changed
-  const double sign = piece.end > piece.start ? 1.0 : -1.0;
-  double low = 0.0;
-  double high = 1.0;
-  double s = std::clamp((boundary - piece.start) / (piece.end - piece.start), 0.0, 1.0);
-  for (int i = 0; i < 40; ++i) {  // Newton, kept inside the bracket; two rounds are usual
-    const double error = curve.value(s) - boundary;
-    if (error * sign > 0.0) {
-      high = s;
-    } else {
-      low = s;
-    }
-    if (error == 0.0) break;
-    const double slope = curve.slope(s);
-    double next = slope != 0.0 ? s - error / slope : low;
-    if (!(next > low && next < high)) next = 0.5 * (low + high);
-    const double change = std::abs(next - s);
-    s = next;
-    if (change < 1e-7) break;  // the error is of the order of its square
-  }
-  return piece.start_s + s * piece.duration_s;
 }
 
 AngleSegment Encoder::View::seen(const AngleSegment& segment) const noexcept {
@@ -227,18 +134,18 @@ void Encoder::follow_with(const AnyView& view, EncoderState& state, std::span<co
   for (std::size_t n = segments.size(); n-- > 0;) {
     const AngleSegment& segment = view.seen(segments[n]);
     const bool starts_at_count = n > 0 || at_start == first_count;
-    const auto search_piece = [&](const Piece& piece, bool is_first) {
+    const auto search_piece = [&](const PathPiece& piece, bool is_first) {
       const std::int64_t first = n == 0 && is_first ? first_count : floor_to_integer(piece.start);
       search(view, newest, base, first, floor_to_integer(piece.end),
              [&piece](double boundary) { return time_of(piece, boundary); });
     };
-    const Piece whole = piece_of(segment);
-    if (is_monotonic(whole.end - whole.start, whole.start_slope, whole.end_slope)) {
+    const PathPiece whole = piece_of(segment);
+    if (whole.is_monotonic()) {
       const bool has_edge = floor_to_integer(whole.start) != floor_to_integer(whole.end);
       if (has_edge || !starts_at_count) search_piece(whole, true);
       continue;
     }
-    const Pieces pieces = monotonic_pieces(segment);
+    const PathPieces pieces = monotonic_pieces(whole);
     for (int i = pieces.size; i-- > 0;)
       search_piece(pieces.piece[static_cast<std::size_t>(i)], i == 0);
   }

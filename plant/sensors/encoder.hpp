@@ -6,6 +6,7 @@
 
 #include "plant/injected_faults.hpp"
 #include "plant/math/rounding.hpp"
+#include "plant/sensors/angle_path.hpp"
 #include "plant/tick.hpp"
 
 namespace drivebench {
@@ -17,17 +18,6 @@ struct EncoderParameters {
   bool swapped = false;              ///< A and B are exchanged: the count falls when the angle rises
   int timer_bits = 0;                ///< of the timers that follow the lines; 0: there are none
   double capture_hz = 0.0;  ///< clock of the timer that measures the time between edges; 0: there is none
-};
-
-/// The shaft between two integration nodes: its angle and speed at both ends. Between them the angle is the
-/// cubic with these end values and slopes, which is exact at constant acceleration.
-struct AngleSegment {
-  double start_s;  ///< from the start of the tick
-  double duration_s;
-  double start_rad;  ///< angle within the turn in which the tick started
-  double end_rad;
-  double start_rad_s;
-  double end_rad_s;
 };
 
 /// One change of the A or B line.
@@ -118,20 +108,6 @@ class Encoder {
   /// The largest number of a timer; 0 without one.
   std::uint64_t timer_mask() const noexcept { return (std::uint64_t{1} << p_.timer_bits) - 1; }
 
-  /// A segment in counts, cut where the shaft reverses, so that the position is monotonic in it.
-  struct Piece {
-    double start_s;
-    double duration_s;
-    double start;  ///< position [counts], with the offset, within the turn
-    double end;
-    double start_slope;  ///< change of position over the piece if the speed stayed [counts]
-    double end_slope;
-  };
-  struct Pieces {
-    std::array<Piece, 3> piece;
-    int size;
-  };
-
   /// A sound encoder under the injected faults.
   struct View {
     bool swapped;
@@ -163,10 +139,10 @@ class Encoder {
               const TimeOf& time_of) const noexcept;
   void take(EncoderState& state, const Newest& newest, Tick tick) const noexcept;
   double position(double angle_rad) const noexcept;
-  Piece piece_of(const AngleSegment& segment) const noexcept;
-  Pieces monotonic_pieces(const AngleSegment& segment) const noexcept;
-  static Piece part(const Piece& whole, double from, double to) noexcept;
-  static double time_of(const Piece& piece, double boundary) noexcept;
+  /// A segment in counts, with the offset.
+  PathPiece piece_of(const AngleSegment& segment) const noexcept {
+    return path_piece(segment, counts_per_rad_, offset_);
+  }
 
   EncoderParameters p_;
   double period_s_;
@@ -202,9 +178,9 @@ void Encoder::for_each_edge(std::span<const AngleSegment> segments, std::int64_t
     go_to(at_start, [](std::int64_t) { return 0.0; });
   }
   for (const AngleSegment& segment : segments) {
-    const Pieces pieces = monotonic_pieces(view.seen(segment));
+    const PathPieces pieces = monotonic_pieces(piece_of(view.seen(segment)));
     for (int i = 0; i < pieces.size; ++i) {
-      const Piece& piece = pieces.piece[static_cast<std::size_t>(i)];
+      const PathPiece& piece = pieces.piece[static_cast<std::size_t>(i)];
       go_to(base + floor_to_integer(piece.end),
             [&](std::int64_t boundary) { return time_of(piece, static_cast<double>(boundary - base)); });
     }

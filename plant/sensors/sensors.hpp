@@ -1,5 +1,6 @@
 #pragma once
 
+#include "plant/sensors/absolute_encoder.hpp"
 #include "plant/sensors/analog_channel.hpp"
 #include "plant/sensors/comparators.hpp"
 #include "plant/sensors/current_sensor.hpp"
@@ -12,7 +13,7 @@
 
 namespace drivebench {
 
-/// All sensors but the encoder.
+/// All sensors but the incremental encoder.
 struct SensorParameters {
   CurrentSensorParameters current{};
   AnalogParameters voltage{};      ///< terminal voltages
@@ -28,6 +29,7 @@ struct SensorParameters {
   ComparatorParameters comparator{};
   ShuntParameters shunts{};
   NtcParameters ntc{};
+  AbsoluteEncoderParameters absolute{};
 
   /// Whether something follows the terminals against the negative rail.
   bool follow_terminals() const noexcept { return terminals || comparator.enabled; }

@@ -33,6 +33,8 @@ struct AxisCore {
   Comparators comparators;
   Shunts shunts;
   Encoder encoder;
+  AbsoluteEncoder absolute;
+  HallCapture hall;
   ShaftConstants shaft;
   bool shaft_has_events;
   Tick tick = 0;        ///< that is running

@@ -219,6 +219,10 @@ typedef struct drivebench_sample {
   uint64_t encoder_timer;      /**< [counts] quadrature timer: the count, which wraps */
   uint64_t
       encoder_capture; /**< [clocks] clocks of the capture timer between the last two edges of the encoder */
+  uint64_t absolute_angle; /**< [counts] absolute encoder: angle within the turn, of 2^bits steps */
+  uint64_t hall_edges;     /**< edges of the Hall lines since tick 0 */
+  double hall_edge_age_s;  /**< [s] time since the last edge of the Hall lines; since tick 0 if none */
+  uint64_t hall_capture;   /**< [clocks] timer when the last edge of the Hall lines came; it wraps */
 } drivebench_sample;
 
 enum drivebench_kind { DRIVEBENCH_KIND_STATUS = 1, DRIVEBENCH_KIND_SENSOR = 2, DRIVEBENCH_KIND_TRUTH = 3 };

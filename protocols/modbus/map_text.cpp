@@ -166,7 +166,8 @@ Functions 1, 2, 3, 4, 5, 6, 15, 16, 22, 23, 43/14 (device identification) and 8/
 Addresses count from 0; the columns 3xxxx and 4xxxx are the traditional notation, which counts from 1. A value of more than one register has
 its most significant word first (ABCD); at the address in column CDAB it has the words in reverse order. One request sees one tick.
 The sample has two blocks without a gap: one request may read the 125 registers from 200 on, which hold every sensor but the terminals against the
-negative rail, the comparators, and the numbers of converters and timers. These have blocks of their own, with the tick before them.
+negative rail, the comparators, the numbers of converters and timers, and the absolute encoder and the capture of the Hall lines. These have blocks of
+their own, with the tick before them.
 
 A value is a register, or registers, times its scaling. Scaled 16-bit values saturate at +-32767 (unsigned: 65534); -32768 (65535) stands for
 "no number". float32 rounds the double precision of the bench, in both directions.

@@ -73,6 +73,7 @@ RegisterMap::RegisterMap(std::span<const ParameterInfo> parameters, bool writabl
       block(9, kRailSample, "terminals against the negative rail"),
       block(10, kComparators, "comparators of the terminals"),
       block(11, kConverters, "numbers of converters and timers"),
+      block(12, kPosition, "absolute encoder and capture of Hall edges"),
   };
 }
 

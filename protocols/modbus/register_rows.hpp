@@ -27,6 +27,7 @@ inline constexpr std::uint16_t kMoreSampleStart = 286;
 inline constexpr std::uint16_t kRailSampleStart = 340;
 inline constexpr std::uint16_t kComparatorStart = 360;
 inline constexpr std::uint16_t kConverterStart = 440;
+inline constexpr std::uint16_t kPositionStart = 490;
 inline constexpr std::uint16_t kCommandStart = 400;
 inline constexpr std::uint16_t kParameterStart = 1000;
 
@@ -209,6 +210,10 @@ inline constexpr auto kHeader = std::to_array<Row>({
     fixed(53, kUnsigned16, kBlockId, "converter_id", "1", "11: numbers of converters and timers", 10),
     fixed(54, kUnsigned16, kBlockStart, "converter_start", "1", "its first register", 10),
     fixed(55, kUnsigned16, kBlockLength, "converter_length", "1", "its number of registers", 10),
+    fixed(56, kUnsigned16, kBlockId, "position_id", "1", "12: absolute encoder and capture of Hall edges",
+          11),
+    fixed(57, kUnsigned16, kBlockStart, "position_start", "1", "its first register", 11),
+    fixed(58, kUnsigned16, kBlockLength, "position_length", "1", "its number of registers", 11),
 });
 
 inline constexpr auto kProcess = std::to_array<Row>({
@@ -271,10 +276,12 @@ inline constexpr std::size_t kMoreSignals = 21;
 inline constexpr std::size_t kRailSignals = 6;
 inline constexpr std::size_t kComparatorSignals = 10;
 inline constexpr std::size_t kConverterSignals = 10;
+inline constexpr std::size_t kPositionSignals = 4;
 inline constexpr std::size_t kBeforeRail = kFirstSignals + kMoreSignals;
 inline constexpr std::size_t kBeforeComparators = kBeforeRail + kRailSignals;
 inline constexpr std::size_t kBeforeConverters = kBeforeComparators + kComparatorSignals;
-static_assert(kBeforeConverters + kConverterSignals == kSignals.size(), "others need a new block");
+inline constexpr std::size_t kBeforePosition = kBeforeConverters + kConverterSignals;
+static_assert(kBeforePosition + kPositionSignals == kSignals.size(), "others need a new block");
 
 constexpr Row sample_row(std::size_t index, std::uint16_t address) {
   const Signal& s = kSignals[index];
@@ -332,6 +339,8 @@ inline constexpr auto kComparators = later_block<kComparatorSignals>(
     kComparatorStart, kBeforeComparators, "comparator_snapshot", "the tick of these comparators");
 inline constexpr auto kConverters = later_block<kConverterSignals>(
     kConverterStart, kBeforeConverters, "converter_snapshot", "the tick of these numbers");
+inline constexpr auto kPosition = later_block<kPositionSignals>(
+    kPositionStart, kBeforePosition, "position_snapshot", "the tick of these sensors");
 
 inline constexpr std::string_view kModeMeaning =
     "0 gates off, 1 voltages, 2 zero voltage, 3 duties from the middle, 4 currents, 5 duties of legs";
@@ -382,7 +391,7 @@ inline constexpr auto kLegs = std::to_array<Row>({
 inline constexpr auto kFixedRows = [] {
   std::array<Row, kHeader.size() + kProcess.size() + kMoreProcess.size() + kSample.size() +
                       kMoreSample.size() + kRailSample.size() + kComparators.size() + kCommand.size() +
-                      kMoreCommand.size() + kLegs.size() + kConverters.size()>
+                      kMoreCommand.size() + kLegs.size() + kConverters.size() + kPosition.size()>
       rows{};
   std::size_t n = 0;
   const auto append = [&](const auto& part) {
@@ -400,6 +409,7 @@ inline constexpr auto kFixedRows = [] {
   append(kMoreCommand);
   append(kLegs);
   append(kConverters);
+  append(kPosition);
   return rows;
 }();
 

@@ -17,9 +17,9 @@ struct Sample {
 
 inline constexpr std::size_t kSampleWords = sizeof(Sample) / 8;
 /// The last of them came when runs had been recorded, in groups that begin with these words: at terminal_a_v,
-/// comparator_levels and i_a_counts. Hashes pass over a group while it is zero.
-inline constexpr std::array<std::size_t, 3> kLaterSampleGroups{offsetof(Sample, terminal_a_v) / 8,
-                                                               offsetof(Sample, comparator_levels) / 8,
-                                                               offsetof(Sample, i_a_counts) / 8};
+/// comparator_levels, i_a_counts and absolute_angle. Hashes pass over a group while it is zero.
+inline constexpr std::array<std::size_t, 4> kLaterSampleGroups{
+    offsetof(Sample, terminal_a_v) / 8, offsetof(Sample, comparator_levels) / 8,
+    offsetof(Sample, i_a_counts) / 8, offsetof(Sample, absolute_angle) / 8};
 
 }  // namespace drivebench

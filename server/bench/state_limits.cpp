@@ -93,7 +93,8 @@ bool is_possible(const AxisState& s) noexcept {
          s.load.is_within(kMaxLoadNm, static_cast<Tick>(kMaxTick)) && is_possible(s.drive) &&
          is_possible_count(s.sensors.tick) && s.sensors.tick >= 0 && is_possible(s.injected) &&
          s.open_terminals <= kAllLegs && std::ranges::all_of(s.comparators.edge_tick, is_possible_count) &&
-         s.comparators.levels <= kAllLegs;
+         s.comparators.levels <= kAllLegs && are_possible_counts({s.hall.sector, s.hall.edge_tick}) &&
+         s.hall.lines <= kAllLegs;
 }
 
 std::string no_state(std::size_t bytes) {

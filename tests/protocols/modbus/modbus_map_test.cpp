@@ -110,6 +110,9 @@ TEST(ModbusMap, EverySignalStandsInTheSampleBlockOnce) {
   EXPECT_EQ(address_of("converter_snapshot"), 440);
   EXPECT_EQ(address_of("i_a_counts"), 444);
   EXPECT_EQ(address_of("encoder_capture"), 480);
+  EXPECT_EQ(address_of("position_snapshot"), 490);
+  EXPECT_EQ(address_of("absolute_angle"), 494);
+  EXPECT_EQ(address_of("hall_capture"), 504);
   EXPECT_EQ(address_of("machine.b"), 1002);
 }
 
@@ -231,7 +234,7 @@ TEST(ModbusMap, ASampleComesBackAsItWasButForFloatRounding) {
     if (signal.type == SignalType::kSigned) sample.*signal.as_signed = std::bit_cast<std::int64_t>(value);
     if (signal.type == SignalType::kReal) sample.*signal.as_real = value;
   }
-  std::vector<std::uint16_t> words(map_detail::kConverters.back().end() - kSampleStart);
+  std::vector<std::uint16_t> words(map_detail::kPosition.back().end() - kSampleStart);
   for (const Row& row : map_detail::kSample)
     put(signal_bits(row, sample), row.type, WordOrder::kAbcd, &words[row.address - kSampleStart]);
   for (const Row& row : map_detail::kMoreSample)
@@ -241,6 +244,8 @@ TEST(ModbusMap, ASampleComesBackAsItWasButForFloatRounding) {
   for (const Row& row : map_detail::kComparators)
     put(signal_bits(row, sample), row.type, WordOrder::kAbcd, &words[row.address - kSampleStart]);
   for (const Row& row : map_detail::kConverters)
+    put(signal_bits(row, sample), row.type, WordOrder::kAbcd, &words[row.address - kSampleStart]);
+  for (const Row& row : map_detail::kPosition)
     put(signal_bits(row, sample), row.type, WordOrder::kAbcd, &words[row.address - kSampleStart]);
   const Sample back = read_sample(words);
   const Sample first = read_sample(std::span(words).first(kSampleLength));

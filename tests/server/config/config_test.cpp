@@ -158,6 +158,8 @@ BenchConfig bench_with_board() {
   p.sensors.temperature.enabled = true;
   p.sensors.temperature.bits = 12;
   p.sensors.ntc = {.ohm = 10e3, .beta_k = 3435.0, .pull_ohm = 10e3};
+  p.sensors.absolute = {.bits = 12, .latency_s = 10e-6};
+  p.sensors.hall = {.enabled = true, .capture_bits = 16, .capture_hz = 1e6};
   return config;
 }
 
@@ -202,7 +204,8 @@ TEST(Config, EveryRowOfTheParameterTableHasAKeyOfItsOwn) {
   const BenchConfig angle = bench_with_angle();
   const auto is_of_board = [](const Parameter& row) {
     return row.later && (row.name.starts_with("inverter.") || row.name.starts_with("current_sensor.") ||
-                         row.name.starts_with("temperature_sensor."));
+                         row.name.starts_with("temperature_sensor.") ||
+                         row.name.starts_with("absolute_encoder.") || row.name.starts_with("hall."));
   };
   std::string alone;
   for (const Parameter& row : axis_parameters(room.setup.axes[0].parameters)) {
