@@ -46,6 +46,7 @@ AxisCore core_of(const AxisParameters& p, AxisTiming timing, std::uint64_t seed,
           .encoder = Encoder(p.encoder, timing.period_s),
           .absolute = AbsoluteEncoder(p.sensors.absolute, timing.period_s),
           .hall = HallCapture(p.sensors.hall, pole_pairs_of(p.machine), timing.period_s),
+          .bootstrap = Bootstrap(p.drive.inverter, timing.period_s),
           .shaft = constants_of(p.mechanics),
           .shaft_has_events = shaft_has_events(p.mechanics)};
 }
@@ -178,10 +179,11 @@ void Axis::begin_tick(const PhaseCommand& command, Tick tick) noexcept {
   core_.drive.begin_tick(state_.drive, command, state_.injected, tick);
   if ((state_.faults & kGatesOffFaults) != 0) core_.drive.switch_off(state_.drive);
   begin_break();
+  begin_bootstrap();
   if (core_.p.sensors.terminals) state_.terminal_mean_v = {};
   core_.follows = core_.drive.follows() || core_.sensors.follows() || core_.p.thermal.enabled ||
                   core_.p.sensors.follow_terminals() || has_impedance(core_.p.drive) || core_.breaks ||
-                  core_.shunts.used() || has_switch_losses(core_.p.drive);
+                  core_.shunts.used() || core_.bootstrap.used() || has_switch_losses(core_.p.drive);
 }
 
 void Axis::begin_break() noexcept {
@@ -190,6 +192,13 @@ void Axis::begin_break() noexcept {
   const bool line = state_.injected.gate_driver_fault != 0.0 && (state_.faults & kBreakInput) == 0;
   if (line && m.pending == 0) pull_break(core_, state_, 0.0);
   core_.breaks = m.pending != 0 || watches_break(core_, state_);
+}
+
+void Axis::begin_bootstrap() noexcept {
+  if (!core_.bootstrap.used()) return;
+  core_.bootstrap.begin_tick(state_.bootstrap);
+  core_.drive.starve(state_.bootstrap.empty);
+  if (state_.bootstrap.empty != 0) state_.faults |= kBootstrapEmpty;
 }
 
 /// What the sensors of the position see of the last segments.

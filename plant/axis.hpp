@@ -110,6 +110,7 @@ class Axis {
   void begin_tick(const PhaseCommand& command, Tick tick) noexcept;
   /// The break input at the start of a tick: the fault line, and what the tick before has left.
   void begin_break() noexcept;
+  void begin_bootstrap() noexcept;
   void follow_rotor() noexcept;
   void end_tick(const MotionState& before, Tick tick) noexcept;
   /// The currents that the sensors convert.

@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 
+#include "plant/drive/bootstrap.hpp"
 #include "plant/drive/break_input.hpp"
 #include "plant/drive/drive.hpp"
 #include "plant/drive/terminals.hpp"
@@ -58,6 +59,7 @@ struct AxisState {
   // Later still, each zero where it is not configured.
   AbsoluteMemory absolute{};
   HallMemory hall{};
+  BootstrapMemory bootstrap{};
 };
 
 }  // namespace drivebench

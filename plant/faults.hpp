@@ -13,6 +13,7 @@ inline constexpr std::uint64_t kOverCurrent = 1u << 2;
 inline constexpr std::uint64_t kShaftHeld = 1u << 3;
 inline constexpr std::uint64_t kSensorSaturated = 1u << 4;
 inline constexpr std::uint64_t kCommandSlewLimited = 1u << 5;
+inline constexpr std::uint64_t kBootstrapEmpty = 1u << 6;
 inline constexpr std::uint64_t kOverCurrentTrip = 1u << 8;
 inline constexpr std::uint64_t kCommandTimeout = 1u << 9;
 inline constexpr std::uint64_t kLeaseLost = 1u << 10;
@@ -40,6 +41,8 @@ inline constexpr auto kFaultTable = std::to_array<FaultInfo>({
     {kShaftHeld, "shaft_held", "stiction or a lock held the shaft at the end of this tick"},
     {kSensorSaturated, "sensor_saturated", "the converter of another sensor was at the end of its range"},
     {kCommandSlewLimited, "command_slew_limited", "a set-point moved faster than slew_per_s and was slowed"},
+    {kBootstrapEmpty, "bootstrap_empty",
+     "an upper switch had no supply in this tick; its leg is on its diodes"},
     {kOverCurrentTrip, "over_current_trip", "latched: over-current switched the gates off"},
     {kCommandTimeout, "command_timeout",
      "latched: no command for watchdog_ticks ticks, safe action in force"},

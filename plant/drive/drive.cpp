@@ -92,7 +92,8 @@ void Drive::begin_tick(DriveMemory& m, const PhaseCommand& command, const Inject
   take_orders(m, faults, tick);
   follows_ = !stiff || filter_rate_per_s_ > 0.0 || kind_ == DriveKind::kCurrent;
   const bool one_order = later_s_ <= tolerance_s_;
-  switches_ = kind_ == DriveKind::kSwitched && has_switches(orders_[1].gates) && !holds_;
+  switches_ = kind_ == DriveKind::kSwitched && has_switches(orders_[1].gates) && !holds_ &&
+              p_.inverter.bootstrap_s == 0.0;
   if (one_order && !follows_ && (kind_ == DriveKind::kVoltage || switches_)) {
     steady_output_ = bridge_output(m, 0.0, period_s_, {});
     steady_ = true;
@@ -310,6 +311,24 @@ void Drive::put_switches(DriveMemory& m, const Order& order, double start_s,
                          TerminalDrive& out) const noexcept {
   find_segment(m, order, start_s);
   order.pattern.put(segment_hint(m), terminals_, out.rail_v, out);
+  if (starved_ == 0) return;
+  for (int k = 0; k < terminals_; ++k) {
+    const bool starved = (starved_ >> k & 1U) != 0 && phase(out.start_v, k) > 0.0;
+    if (starved) out.mode[static_cast<std::size_t>(k)] = TerminalMode::kDiodes;
+  }
+}
+
+LegLevels Drive::closed_switches(DriveMemory& m, double start_s) const noexcept {
+  LegLevels closed{LegLevel::kOff, LegLevel::kOff, LegLevel::kOff};
+  const Order& order = order_at(start_s);
+  if (m.switched_off != 0.0 || !has_switches(order.gates)) return closed;
+  TerminalDrive out{.rail_v = 1.0};
+  put_switches(m, order, start_s, out);
+  for (std::size_t k = 0; k < static_cast<std::size_t>(terminals_); ++k) {
+    if (out.mode[k] != TerminalMode::kDriven || (order.legs_off >> k & 1U) != 0) continue;
+    closed[k] = phase(out.start_v, static_cast<int>(k)) > 0.0 ? LegLevel::kHigh : LegLevel::kLow;
+  }
+  return closed;
 }
 
 bool Drive::switch_terminals(DriveMemory& m, double start_s, TerminalDrive& out) const noexcept {

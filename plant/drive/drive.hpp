@@ -136,6 +136,12 @@ class Drive {
   /// says. Faults that hold a terminal, and switch_off(), go before.
   void hold_legs(DriveMemory& m, const LegLevels& levels) noexcept;
 
+  /// From here on the upper switches of these legs, bit 0 for a, stay open: their drivers have no supply.
+  void starve(std::uint64_t legs) noexcept { starved_ = legs; }
+  /// The switches that are closed from this instant on, those of a switched inverter; kOff is none of the
+  /// leg.
+  LegLevels closed_switches(DriveMemory& m, double start_s) const noexcept;
+
   /// Whether at() gives the same during what is left of the tick, whatever the machine does.
   bool steady(const DriveMemory& m) const noexcept { return steady_ && !switches_ && m.switched_off == 0.0; }
   /// Whether at() changes during what is left of the tick by the switches alone: see switch_terminals().
@@ -260,6 +266,7 @@ class Drive {
   double later_s_ = 0.0;
   std::array<Hold, 3> hold_{};
   bool holds_ = false;  ///< any
+  std::uint64_t starved_ = 0;
   bool field_lost_ = false;
   double supply_v_ = 0.0;  ///< of the bus
   double source_amplitude_v_ = 0.0;

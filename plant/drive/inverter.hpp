@@ -19,8 +19,10 @@ struct InverterParameters {
   double dead_time_s = 0.0;       ///< at each commutation both switches are open for so long
   double dead_time_band_a = 0.1;  ///< averaged: within it the dead-time error goes linearly through zero
   // Switched:
-  double switch_ohm = 0.0;  ///< R_ds(on) of a closed switch, in both directions of the current
-  double diode_v = 0.0;     ///< forward voltage V_f of a diode, whatever its current
+  double switch_ohm = 0.0;            ///< R_ds(on) of a closed switch, in both directions of the current
+  double diode_v = 0.0;               ///< forward voltage V_f of a diode, whatever its current
+  double bootstrap_s = 0.0;           ///< so long a full supply keeps an upper switch closed; 0: for ever
+  double bootstrap_recharge_s = 0.0;  ///< so long a lower switch takes to fill an empty one
   // Both:
   double break_current_a = 0.0;  ///< a phase current beyond it, either sign, opens all legs; 0: none does
   double break_delay_s = 0.0;    ///< from that, or from the fault line, until the legs are open

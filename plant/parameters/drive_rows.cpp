@@ -223,6 +223,7 @@ void add_shared_problems(const DriveParameters& p, Problems& found) {
   must_be_zero("inverter.switch_ohm", p.inverter.switch_ohm);
   must_be_zero("inverter.diode_v", p.inverter.diode_v);
   must_be_zero("inverter.break_current_a", p.inverter.break_current_a);
+  must_be_zero("inverter.bootstrap_s", p.inverter.bootstrap_s);
   if (p.kind == DriveKind::kCurrent || p.kind == DriveKind::kSource) {
     found.add("drive.kind", [&] {
       return "is \"" + std::string(kKinds[static_cast<std::size_t>(p.kind)]) +

@@ -100,6 +100,10 @@ constexpr auto kTable = std::to_array<Parameter>({
     hall<&HallParameters::capture_bits>("hall.capture_bits", "bit", 0, 32, kInteger | kLater,
                                         "of hall_capture; 0: none"),
     hall<&HallParameters::capture_hz>("hall.capture_hz", "Hz", 0, 1e9, kLater, "clock of hall_capture"),
+    inverter<&Inverter::bootstrap_s>("inverter.bootstrap_s", "s", 0, 1e3, kLater,
+                                     "an upper switch opens after it; 0: never"),
+    inverter<&Inverter::bootstrap_recharge_s>("inverter.bootstrap_recharge_s", "s", 0, 1e3, kLater,
+                                              "a lower switch makes up for that within it"),
 });
 
 bool has_bits(const SensorParameters& p) noexcept {
@@ -134,6 +138,22 @@ void add_switch_problems(const DriveParameters& p, Problems& found) {
   }
   if (p.kind != DriveKind::kSwitched && p.kind != DriveKind::kAveraged && p.inverter.break_current_a != 0.0) {
     needs("inverter.break_current_a", p.inverter.break_current_a, "unless drive.kind is an inverter");
+  }
+}
+
+void add_bootstrap_problems(const AxisParameters& p, Problems& found) {
+  const InverterParameters& inverter = p.drive.inverter;
+  if (inverter.bootstrap_s > 0.0 &&
+      (p.drive.kind != DriveKind::kSwitched || connection_of(p.machine) != Connection::kStar)) {
+    found.add("inverter.bootstrap_s", [&] {
+      return "is " + text(inverter.bootstrap_s) +
+             " s but needs drive.kind = \"switched_inverter\" and a machine with three phases in a star";
+    });
+  }
+  if (inverter.bootstrap_recharge_s > 0.0 && inverter.bootstrap_s == 0.0) {
+    found.add("inverter.bootstrap_recharge_s", [&] {
+      return "is " + text(inverter.bootstrap_recharge_s) + " s but must be 0 where inverter.bootstrap_s is 0";
+    });
   }
 }
 
@@ -245,6 +265,7 @@ void add_later_problems(const AxisParameters& p, Problems& found) {
   add_shunt_problems(p, found);
   add_ntc_problems(p.sensors, found);
   add_position_problems(p.sensors, found);
+  add_bootstrap_problems(p, found);
   if (p.sensors.counts && !has_bits(p.sensors)) {
     found.add("converter.counts",
               "is 1 but no converter has bits: current_sensor.bits, or voltage_sensor, bus_sensor or "

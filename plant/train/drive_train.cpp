@@ -74,6 +74,14 @@ bool meet_break(AxisCore& core, AxisState& state, double now_s, const PhaseValue
   return true;
 }
 
+void meet_bootstrap(AxisCore& core, AxisState& state, double now_s) noexcept {
+  const auto legs = [&] { return core.drive.closed_switches(state.drive, now_s); };
+  // A leg that has a supply again may be one that is to be high. One that has lost it needs time.
+  while (core.bootstrap.meet(state.bootstrap, now_s, legs()))
+    core.drive.starve(state.bootstrap.empty);
+  if (state.bootstrap.empty != 0) state.faults |= kBootstrapEmpty;
+}
+
 void follow_piece(AxisCore& core, AxisState& state, double start_s, double duration_s,
                   const TerminalDrive& drive, const TerminalCircuit& circuit, const Measurable& from,
                   const Measurable& to) noexcept {

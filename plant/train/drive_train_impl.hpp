@@ -124,6 +124,7 @@ void DriveTrain<Machine, Shaft>::run_piece(AxisCore& core, AxisState& state, Who
         core.tap->events.add({.at_s = start_s, .kind = EventKind::kBreak, .channel = 0, .level = 1});
       }
     }
+    if (core.bootstrap.used()) meet_bootstrap(core, state, start_s);
     const double stop_s = piece_stop_s(core, state, start_s, end_s);
     const double duration_s = stop_s - start_s;
     connect_piece(core, state, start_s, duration_s, from.machine, from_motion);

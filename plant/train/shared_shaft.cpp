@@ -121,6 +121,9 @@ void SharedShaft::run_piece(Shaft& x, double start_s, double end_s, double load_
   for (std::size_t events = 0; start_s < end_s; ++events) {
     meet_break_of(first_, start_s, first_motion(x));
     meet_break_of(second_, start_s, second_motion(x));
+    for (Side* const side : {&first_, &second_}) {
+      if (side->core.bootstrap.used()) meet_bootstrap(side->core, side->state, start_s);
+    }
     const double stop_s = piece_stop_s(first_.core, first_.state, start_s,
                                        piece_stop_s(second_.core, second_.state, start_s, end_s));
     const double duration_s = stop_s - start_s;

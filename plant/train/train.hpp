@@ -35,6 +35,7 @@ struct AxisCore {
   Encoder encoder;
   AbsoluteEncoder absolute;
   HallCapture hall;
+  Bootstrap bootstrap;
   ShaftConstants shaft;
   bool shaft_has_events;
   Tick tick = 0;        ///< that is running
@@ -128,11 +129,15 @@ void pull_break(const AxisCore& core, AxisState& state, double now_s) noexcept;
 /// the legs open if their time has come. Whether they have opened.
 bool meet_break(AxisCore& core, AxisState& state, double now_s, const PhaseValues& current_a) noexcept;
 
+/// At the start of each piece where Bootstrap::used(): the supplies of the upper switches follow their legs.
+void meet_bootstrap(AxisCore& core, AxisState& state, double now_s) noexcept;
+
 /// The end of a piece that is to go from start_s to end_s: where legs open or currents are converted, if
 /// that is before.
 inline double piece_stop_s(const AxisCore& core, const AxisState& state, double start_s,
                            double end_s) noexcept {
-  const double stop_s = core.shunts.used() ? core.shunts.stop_s(start_s, end_s) : end_s;
+  double stop_s = core.shunts.used() ? core.shunts.stop_s(start_s, end_s) : end_s;
+  if (core.bootstrap.used()) stop_s = core.bootstrap.stop_s(state.bootstrap, stop_s);
   return core.breaks && state.break_input.opens_s() < stop_s ? state.break_input.due_s : stop_s;
 }
 

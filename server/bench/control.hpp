@@ -73,7 +73,7 @@ inline constexpr auto kLaterWords<Sample> = [] {
 template <>
 inline constexpr auto kLaterWords<AxisState> = [] {
   constexpr std::size_t kCommands = std::tuple_size_v<decltype(DriveMemory::commands)>;
-  std::array<WordRange, kCommands + 7> ranges{};
+  std::array<WordRange, kCommands + 8> ranges{};
   for (std::size_t n = 0; n < kCommands; ++n) {
     ranges[n] = edges_of_command_at(offsetof(AxisState, drive) + offsetof(DriveMemory, commands) +
                                     n * sizeof(PhaseCommand));
@@ -88,6 +88,7 @@ inline constexpr auto kLaterWords<AxisState> = [] {
   ranges[kCommands + 4] = {.first = offsetof(AxisState, shunts) / 8, .count = sizeof(ShuntMemory) / 8};
   ranges[kCommands + 5] = {.first = offsetof(AxisState, absolute) / 8, .count = sizeof(AbsoluteMemory) / 8};
   ranges[kCommands + 6] = {.first = offsetof(AxisState, hall) / 8, .count = sizeof(HallMemory) / 8};
+  ranges[kCommands + 7] = {.first = offsetof(AxisState, bootstrap) / 8, .count = sizeof(BootstrapMemory) / 8};
   return ranges;
 }();
 

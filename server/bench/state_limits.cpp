@@ -94,7 +94,8 @@ bool is_possible(const AxisState& s) noexcept {
          is_possible_count(s.sensors.tick) && s.sensors.tick >= 0 && is_possible(s.injected) &&
          s.open_terminals <= kAllLegs && std::ranges::all_of(s.comparators.edge_tick, is_possible_count) &&
          s.comparators.levels <= kAllLegs && are_possible_counts({s.hall.sector, s.hall.edge_tick}) &&
-         s.hall.lines <= kAllLegs;
+         s.hall.lines <= kAllLegs && s.bootstrap.empty <= kAllLegs &&
+         std::ranges::all_of(s.bootstrap.level, [](std::int64_t level) { return std::abs(level) <= 1; });
 }
 
 std::string no_state(std::size_t bytes) {

@@ -160,6 +160,7 @@ BenchConfig bench_with_board() {
   p.sensors.ntc = {.ohm = 10e3, .beta_k = 3435.0, .pull_ohm = 10e3};
   p.sensors.absolute = {.bits = 12, .latency_s = 10e-6};
   p.sensors.hall = {.enabled = true, .capture_bits = 16, .capture_hz = 1e6};
+  p.drive.inverter.bootstrap_s = 1e-3;
   return config;
 }
 
