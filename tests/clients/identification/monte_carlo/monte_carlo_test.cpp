@@ -2,9 +2,15 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <fstream>
+#include <iterator>
+#include <set>
 #include <sstream>
 #include <string>
+
+#include "clients/identification/data/noise.hpp"
+#include "tests/clients/identification/monte_carlo/random_motors.hpp"
 
 namespace drivebench::identification {
 namespace {
@@ -37,6 +43,36 @@ TEST(MonteCarlo, ThreadsDoNotChangeABit) {
         EXPECT_EQ(alone[kind].findings[motor][k].estimate, shown()[kind].findings[motor][k].estimate);
         EXPECT_EQ(alone[kind].findings[motor][k].index, shown()[kind].findings[motor][k].index);
       }
+    }
+  }
+}
+
+/// The smallest distance between two values that a signal takes.
+double step_of(const Series& x) {
+  const std::set<double> values(x.begin(), x.end());
+  double step = *values.rbegin() - *values.begin();
+  for (auto upper = std::next(values.begin()); upper != values.end(); ++upper)
+    step = std::min(step, *upper - *std::prev(upper));
+  return step;
+}
+
+// The table says 12 bits and a noise of one step rms for currents and voltages. Required is half a step,
+// which is more than a converter without noise shows (0.29) and less than the median of noise and rounding
+// (1.04). Catches: exact voltages, because their converter is not there; a noise of zero.
+TEST(MonteCarlo, CurrentsAndVoltagesHaveTheNoiseOfTheirConverters) {
+  constexpr double kSteps = 4096.0;
+  std::vector<const MotorDraw*> draws{&saturated_draw()};
+  for (const MotorDraw& draw : motor_draws())
+    draws.push_back(&draw);
+  for (const MotorDraw* draw : draws) {
+    const Recorded run = record_motor(*draw, 1, 1);
+    for (const Column& column : run.data.columns) {
+      if (!column.name.starts_with("i_") && !column.name.starts_with("u_")) continue;
+      SCOPED_TRACE(std::string(draw->name) + " " + column.name);
+      const auto [least, most] = std::ranges::minmax(column.values);
+      const double step = step_of(column.values);
+      EXPECT_LT(most - least, 1.001 * kSteps * step);
+      EXPECT_GT(white_noise(column.values), 0.5 * step);
     }
   }
 }

@@ -133,6 +133,7 @@ void put_sensors(AxisParameters& p, double current_a, double voltage_v) {
   p.sensors.current.bits = 12;
   p.sensors.current.full_scale_a = current_a;
   p.sensors.current.noise_rms_a = current_a / kSteps;
+  p.sensors.voltage.enabled = true;
   p.sensors.voltage.bits = 12;
   p.sensors.voltage.full_scale = voltage_v;
   p.sensors.voltage.noise_rms = voltage_v / kSteps;
