@@ -21,9 +21,18 @@ const std::vector<ParameterInfo>& parameters() {
 
 const std::vector<Area>& areas() {
   static const std::vector<Area> whole = [] {
-    std::vector<Area> all{{0, 56},   {100, 13}, {120, 22}, {200, 136}, {340, 16},
-                          {360, 32}, {400, 11}, {420, 14}, {440, 44},  {1000, 2 * parameters().size()}};
-    for (std::size_t i = 0; i < 10; ++i)
+    std::vector<Area> all{{0, 59},
+                          {100, 13},
+                          {120, 22},
+                          {200, 136},
+                          {340, 16},
+                          {360, 32},
+                          {400, 11},
+                          {420, 14},
+                          {440, 44},
+                          {490, 18},
+                          {1000, 2 * parameters().size()}};
+    for (std::size_t i = 0; i < 11; ++i)
       all.push_back({all[i].start + 10'000, all[i].length});
     return all;
   }();
@@ -230,7 +239,7 @@ TEST(Modbus, MB_04_AWriteIsWholeOrDoesNotHappen) {
   ASSERT_EQ(client.write(400, {7}), 0);
   EXPECT_EQ(client.write(408, {0, 0, 0}), 2) << "partly outside";
   EXPECT_EQ(client.write(103, {5, 6}), 2) << "the second register is read-only";
-  EXPECT_EQ(client.ask(read_write_pdu(500, 1, 402, {1})), exception_pdu(23, 2)) << "the read half is bad";
+  EXPECT_EQ(client.ask(read_write_pdu(600, 1, 402, {1})), exception_pdu(23, 2)) << "the read half is bad";
   EXPECT_EQ(client.ask(read_write_pdu(0, 1, 402, {9})), exception_pdu(23, 3)) << "the write half is bad";
   EXPECT_EQ(client.read(101, 3), (Words{0, 0, 0}));
   EXPECT_EQ(client.read(402, 7), (Words{0, 0, 0, 0, 0, 0, 0}));

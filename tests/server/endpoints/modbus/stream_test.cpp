@@ -92,7 +92,7 @@ TEST(Modbus, MB_08_PipelinedRequestsAreAnsweredInOrder) {
   Bytes stream;
   for (std::uint16_t i = 0; i < 64; ++i) {
     const Bytes adu =
-        adu_of(static_cast<std::uint16_t>(1000 + i), 1, pdu_of(3, {i % 4 == 3 ? 500u : 2u + i % 4, 1}));
+        adu_of(static_cast<std::uint16_t>(1000 + i), 1, pdu_of(3, {i % 4 == 3 ? 600u : 2u + i % 4, 1}));
     stream.insert(stream.end(), adu.begin(), adu.end());
   }
   const auto expect_answers = [&client] {

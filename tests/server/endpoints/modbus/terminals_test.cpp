@@ -212,13 +212,13 @@ TEST(ModbusTerminals, TheParametersOfTheFirstMapStayWhereTheyWere) {
 TEST(ModbusTerminals, TheHeaderTellsOfTheOtherBlocks) {
   ModbusBench bench;
   Client client(bench.port());
-  const Words header = client.read(0, 56);
+  const Words header = client.read(0, 59);
   EXPECT_EQ(Words(header.begin() + 5, header.begin() + 17),
             (Words{4, 1, 100, 13, 2, 200, 86, 3, 400, 11, 4, 1000}));
   EXPECT_EQ(Words(header.begin() + 30, header.begin() + 40), (Words{3, 5, 120, 22, 6, 286, 50, 7, 420, 13}));
-  EXPECT_EQ(Words(header.begin() + 43, header.begin() + 56),
-            (Words{4, 8, 433, 1, 9, 340, 16, 10, 360, 32, 11, 440, 44}));
-  for (const std::size_t at : {31u, 34u, 37u, 44u, 47u, 50u, 53u})
+  EXPECT_EQ(Words(header.begin() + 43, header.begin() + 59),
+            (Words{5, 8, 433, 1, 9, 340, 16, 10, 360, 32, 11, 440, 44, 12, 490, 18}));
+  for (const std::size_t at : {31u, 34u, 37u, 44u, 47u, 50u, 53u, 56u})
     EXPECT_FALSE(client.read(header[at + 1], header[at + 2]).empty()) << at;
 }
 
