@@ -164,6 +164,7 @@ std::optional<Suspicion> suspicion_of(const Predictor<Model>& predictor, const F
   const Model model(trial, e);
   const std::vector<Suspect> suspects = suspects_of(e, record, errors_of(trial));
   std::vector<Moved<Model>> moved;
+  moved.reserve(suspects.size());
   for (const Suspect& suspect : suspects)
     moved.push_back({.model = model, .errors = suspect.errors, .sensors = true});
   Eigen::MatrixXd directions;
