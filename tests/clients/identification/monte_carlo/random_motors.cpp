@@ -128,12 +128,12 @@ double drawn(const Range& range, double part) {
 }
 
 /// Converters of 12 bits for currents and voltages, both with a noise of one step rms.
-void put_sensors(AxisParameters& p, double current_a, double voltage_v) {
+void put_sensors(AxisParameters& p, double current_a, double voltage_v, bool converts_voltages = true) {
   constexpr double kSteps = 2048.0;
   p.sensors.current.bits = 12;
   p.sensors.current.full_scale_a = current_a;
   p.sensors.current.noise_rms_a = current_a / kSteps;
-  p.sensors.voltage.enabled = true;
+  p.sensors.voltage.enabled = converts_voltages;
   p.sensors.voltage.bits = 12;
   p.sensors.voltage.full_scale = voltage_v;
   p.sensors.voltage.noise_rms = voltage_v / kSteps;
@@ -227,7 +227,7 @@ Recorded run_induction(BenchConfig config, const MotorDraw& draw, const std::vec
     p.machine = straight;
   p.mechanics.inertia_kgm2 = motor[4];
   p.drive.source.phase_rad = motor[8];
-  put_sensors(p, 2.0 * kAmplitude / (kLine * motor[3] * motor[2]), 500.0);
+  put_sensors(p, 2.0 * kAmplitude / (kLine * motor[3] * motor[2]), 500.0, draw.converts_voltages);
   config.axes[0].events = {{.tick = 0, .action = LoadChange{.load_nm = motor[5], .ramp_ticks = 0}}};
   BookBench run(config);
   Recorder record = line_recorder(run.period_s(), false);
@@ -249,7 +249,7 @@ Recorded run_induction(BenchConfig config, const MotorDraw& draw, const std::vec
   return {std::move(record.data()), e};
 }
 
-Recorded run_pm(BenchConfig config, const std::vector<double>& motor) {
+Recorded run_pm(BenchConfig config, const MotorDraw& draw, const std::vector<double>& motor) {
   constexpr int kCounts = 8000;
   constexpr int kPolePairs = 50;
   AxisParameters& p = config.setup.axes[0].parameters;
@@ -264,7 +264,7 @@ Recorded run_pm(BenchConfig config, const std::vector<double>& motor) {
   p.drive.amplifier.delay_ticks = 0.0;
   p.drive.amplifier.filter_hz = 0.0;
   p.encoder.counts_per_revolution = kCounts;
-  put_sensors(p, 20.0, 50.0);
+  put_sensors(p, 20.0, 50.0, draw.converts_voltages);
   BookBench run(config);
   Recorder record({"i_a_a", "i_b_a", "u_a_v", "u_b_v", "encoder_count"}, run.period_s());
   run.control_until(0.4, [&](const Sample& s) {
@@ -284,7 +284,7 @@ Recorded run_pm(BenchConfig config, const std::vector<double>& motor) {
   return {std::move(record.data()), e};
 }
 
-Recorded run_salient(BenchConfig config, const std::vector<double>& motor) {
+Recorded run_salient(BenchConfig config, const MotorDraw& draw, const std::vector<double>& motor) {
   constexpr int kCounts = 4096;
   constexpr int kPolePairs = 4;
   AxisParameters& p = config.setup.axes[0].parameters;
@@ -298,7 +298,7 @@ Recorded run_salient(BenchConfig config, const std::vector<double>& motor) {
   p.mechanics.viscous_friction_nms = motor[5];
   p.mechanics.coulomb_friction_nm = p.mechanics.static_friction_nm = motor[6];
   p.encoder.counts_per_revolution = kCounts;
-  put_sensors(p, 40.0, 50.0);
+  put_sensors(p, 40.0, 50.0, draw.converts_voltages);
   BookBench run(config);
   Recorder record({"i_a_a", "i_b_a", "i_c_a", "u_a_v", "u_b_v", "u_c_v", "encoder_count"}, run.period_s());
   run.control_until(0.6, [&](const Sample& s) {
@@ -388,8 +388,8 @@ Recorded record_motor(const MotorDraw& draw, const std::vector<double>& motor, s
     case MotorKind::kInduction:
       return run_induction(std::move(config), draw, motor);
     case MotorKind::kPmSynchronous:
-      return draw.iron == Iron::kSalient ? run_salient(std::move(config), motor)
-                                         : run_pm(std::move(config), motor);
+      return draw.iron == Iron::kSalient ? run_salient(std::move(config), draw, motor)
+                                         : run_pm(std::move(config), draw, motor);
     case MotorKind::kBldc:
       break;
   }

@@ -35,6 +35,7 @@ struct MotorDraw {
   double longest_s;                  ///< induction: the record ends here, whether the motor has run up or not
   Iron iron = Iron::kPlain;          ///< salient: L_d and L_q of a PM rotor; saturated: a magnetising curve
   std::span<const Range> derived{};  ///< what the experiment identifies as well, and no range has
+  bool converts_voltages = true;     ///< false: the voltages of induction and PM motors are exact
 
   /// The identified parameters, then the derived ones.
   std::vector<Range> rows() const;
