@@ -5,7 +5,7 @@ import assert from "node:assert/strict";
 import test from "node:test";
 import { page } from "./sources.mjs";
 
-const { wordsOf, verdictOf, summaryOf, countsOf, identificationIn, isInside, amplitude, drawnSpeed, gatesOf, wavesOf, fieldsOf, targetOf, Leases, pb } = page;
+const { wordsOf, verdictOf, summaryOf, countsOf, identificationIn, isInside, amplitude, drawnSpeed, gatesOf, wavesOf, fieldsOf, targetOf, Leases, Changes, pb } = page;
 
 // Catches: a common voltage of the terminals that counts as amplitude, the sum of three phases for their vector.
 test("the amplitude of terminals", () => {
@@ -44,6 +44,47 @@ test("a renewal that crosses the giving back", async (t) => {
   await refuse();
   assert.deepEqual([told.at(-1), leases.holds(0)], ["lease: not yours", false]);
   leases.end();
+});
+
+/** A bench on a slow way: it has gone on by so many ticks when a request arrives, and stands at the last tick that is given. */
+function slowBench(ticksOnTheWay, standsAt = Infinity) {
+  const bench = { tick: 100, asked: [] };
+  bench.ask = async (kind) => {
+    if (kind.status_request) {
+      bench.tick = Math.min(bench.tick + 10, standsAt);
+      return { status: { tick: bench.tick } };
+    }
+    bench.asked.push(kind.inject_fault ?? kind.set_load);
+    if (bench.asked.length % 2 === 1) bench.tick += ticksOnTheWay;
+    return { done: { tick: bench.tick } };
+  };
+  return bench;
+}
+
+const lent = { holds: () => false, under: (axis, act) => act() };
+const forTicks = (ticks) => (start) => [start, start + ticks].map((at_tick, i) => ({ inject_fault: { value: 1 - i, at_tick } }));
+
+// Catches: a fault whose begin and end the bench has passed before it hears of them, so that it lasts no tick and is told as done;
+// one that came late and lasted shorter, told with the ticks that were asked.
+test("a fault of some ticks on a slow way", async () => {
+  const inTime = slowBench(50);
+  assert.deepEqual(await new Changes(inTime, lent, 1e-3).make(0, forTicks(3), false), [611, 614]);
+  const slow = slowBench(1000);
+  assert.deepEqual(await new Changes(slow, lent, 1e-3).make(0, forTicks(3), false), [3121, 3124]);
+  assert.equal(slow.asked.length, 4);
+  const late = slowBench(1000);
+  assert.deepEqual(await new Changes(late, lent, 1e-3).make(0, forTicks(800), false), [1110, 1411]);
+  await assert.rejects(new Changes(slowBench(1e6), lent, 1e-3).make(0, forTicks(3), false), /past the end of the fault/);
+});
+
+// Catches: a lease that is given back before the fault has ended, and a page that waits for ever for a bench that stands, or tells its fault as done.
+test("the lease of a moment lasts until the fault has ended", async () => {
+  const bench = slowBench(1);
+  assert.deepEqual(await new Changes(bench, lent, 1e-3).make(0, forTicks(3), true), [611, 614]);
+  assert.ok(bench.tick > 614);
+  await assert.rejects(new Changes(slowBench(0, 300), lent, 1e-3).make(0, forTicks(3), true), /stands at tick 300: what was to act at tick 614/);
+  const standing = slowBench(0, 110);
+  assert.deepEqual(await new Changes(standing, lent, 1e-3).make(0, () => [{ set_load: {} }], true), [110]);
 });
 
 // Catches: a run that ended early and is called done, a part of a run that is rounded up to the whole.

@@ -159,6 +159,23 @@ test("the trigger asks the server and fetches what it has kept", async () => {
   assert.equal(server.asked.filter((each) => each.trigger).length, 4, "nothing to end");
 });
 
+// Catches: the refusal of an older setting that comes in one message with the answer to the newest, and is shown as the newest's; an
+// event in the same message that is taken for one of the older setting.
+test("a refusal and the answer to the next setting in one message", async () => {
+  const server = fakeServer(() => []);
+  const trigger = new Trigger(server, () => {});
+  trigger.settings = { ...trigger.settings, condition: "leaves", signal: "injected", upper: NaN };
+  trigger.arm([], 100);
+  trigger.settings = { ...trigger.settings, upper: 0 };
+  trigger.arm([], 100);
+  server.open[0].refuse("upper is not a finite number");
+  server.open[1].answer();
+  trigger.take({ capture: 1, tick: 5, complete: false });
+  assert.deepEqual([trigger.isArmed, trigger.firedTick, trigger.problem], [true, 5, ""]);
+  await settled();
+  assert.deepEqual([trigger.isArmed, trigger.firedTick, trigger.problem], [true, 5, ""]);
+});
+
 // Catches: 8.5e-170 for nothing, a prefix for a count, a word that is read as a number.
 test("numbers for people", () => {
   assert.equal(withUnit(0.0123, "A"), "12.30 mA");

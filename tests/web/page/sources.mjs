@@ -4,7 +4,7 @@ import { createRequire } from "node:module";
 const { buildSync } = createRequire(`${process.env.PAGE_PACKAGES}/`)("esbuild");
 const { outputFiles } = buildSync({
   stdin: {
-    contents: ["history", "measurements", "trigger", "capture", "bench", "latenesses", "mcap_export", "numbers", "view", "exports", "curves", "spectrum", "drive_train", "drive_target", "leases", "preset_rows", "verdict", "transports", "reports/identification", "wire",
+    contents: ["history", "measurements", "trigger", "capture", "bench", "latenesses", "mcap_export", "numbers", "view", "exports", "curves", "spectrum", "drive_train", "drive_target", "leases", "changes", "preset_rows", "verdict", "transports", "reports/identification", "wire",
       "player/recorded", "player/mcap", "experiments/fetch", "experiments/request", "experiments/words"].map((each) => `export * from "./${each}";`).join("\n"),
     resolveDir: process.env.PAGE_SOURCES, loader: "ts",
   },

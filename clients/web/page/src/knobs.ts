@@ -1,22 +1,22 @@
 /** What an operator changes of an axis: parameters, load, bumps, faults, the lease. The server judges each request. */
 import { Bench } from "./bench";
 import { button, choice, element, setText } from "./dom";
+import { Changes } from "./changes";
 import { Leases } from "./leases";
 import { numberIn, plain } from "./numbers";
 import { pb } from "./wire";
 
 const kReadMs = 2000;
-const kPatienceMs = 1500;
-/** How far ahead a fault for some ticks begins. */
-const kAhead_s = 0.5;
 
 export class Knobs {
   private readonly answer = element("p", { class: "answer", role: "status" });
   private readonly values = new Map<string, HTMLElement>();
   private readonly leaseButtons: HTMLButtonElement[] = [];
+  private readonly changes: Changes;
   private timer = 0;
 
   constructor(root: HTMLElement, private readonly bench: Bench, private readonly leases: Leases) {
+    this.changes = new Changes(bench.wire, leases, bench.description.period_s as number);
     root.hidden = !bench.mayChange;
     root.replaceChildren();
     if (!bench.mayChange) return;
@@ -42,32 +42,14 @@ export class Knobs {
     this.answer.classList.toggle("bad", isBad);
   }
 
-  /**
-   * Asks and shows the answer; if the requests need a lease and the page holds none, under a lease of a moment. The requests
-   * may depend on the present tick, and go out together.
-   */
-  private async change(axis: number, what: string, requests: (tick: number) => pb.IEnvelope[],
+  /** Asks and shows the answer. */
+  private async change(axis: number, what: string, requests: (start: number) => pb.IEnvelope[],
     underLease = this.bench.changesUnderLease): Promise<void> {
-    const borrows = underLease && !this.leases.holds(axis);
-    const act = async () => {
-      const { status } = await this.bench.wire.ask({ status_request: {} });
-      const made = requests(status?.tick as number);
-      const answers = await Promise.all(made.map((each) => this.bench.wire.ask(each)));
-      if (borrows) await this.reached(axis, Math.max(...made.map((each) => (each.inject_fault?.at_tick ?? 0) as number)));
-      return made.map((each, i) => each.inject_fault?.at_tick || answers[i].done?.tick);
-    };
     try {
-      const ticks = await (underLease ? this.leases.under(axis, act) : act());
+      const ticks = await this.changes.make(axis, requests, underLease);
       this.tell(`${what}: done at tick ${ticks.join(" and ")}`);
     } catch (problem) {
       this.tell(`${what}: ${(problem as Error).message}`, true);
-    }
-  }
-
-  /** Waits for a tick: what is scheduled ends with the lease. */
-  private async reached(axis: number, tick: number): Promise<void> {
-    for (const end = performance.now() + kPatienceMs; this.bench.histories[axis].lastTick < tick && performance.now() < end;) {
-      await new Promise((done) => setTimeout(done, 20));
     }
   }
 
@@ -134,10 +116,7 @@ export class Knobs {
       const put = (value: number, atTick: number) => ({ inject_fault: { axis, name, value, at_tick: atTick } });
       if (ticks === 0) void this.change(axis, `fault ${name}`, () => [put(size, 0)]);
       // Both instants in the same future, so that the fault lasts exactly so long.
-      else void this.change(axis, `fault ${name} for ${ticks} ticks`, (now) => {
-        const at = now + this.ticks(kAhead_s) + 1;
-        return [put(size, at), put(0, at + ticks)];
-      });
+      else void this.change(axis, `fault ${name} for ${ticks} ticks`, (start) => [put(size, start), put(0, start + ticks)]);
     };
     return element("div", {}, element("form", { class: "bar", submit: (event) => {
       event.preventDefault();

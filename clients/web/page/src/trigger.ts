@@ -45,7 +45,8 @@ export class Trigger {
   missedEvents = 0;
   lostTicks = 0;
   private channels: Channel[] = [];
-  private unanswered = 0; // requests that set the trigger; what comes before the last answer is of another setting
+  private setting = 0; // the number of the newest
+  private settingInForce = 0; // the newest that is answered: events are of this one
   private lastFired = Infinity;
 
   /** `changed` is called when there is something to show. */
@@ -76,7 +77,7 @@ export class Trigger {
 
   /** An event, and later that its capture is complete. */
   take(triggered: pb.Triggered): void {
-    if (!this.isArmed || this.unanswered > 0) return;
+    if (!this.isArmed || this.settingInForce !== this.setting) return;
     this.firedTick = this.lastFired = triggered.tick as number;
     this.missedEvents = triggered.missed_events as number;
     this.lostTicks = triggered.lost_ticks as number;
@@ -89,11 +90,14 @@ export class Trigger {
     this.firedTick = this.captured = null;
     this.problem = "";
     this.lastFired = Infinity;
-    ++this.unanswered;
-    const answered = () => --this.unanswered < 0;
+    const setting = ++this.setting;
+    // Noted while the message is read: an event may follow in the same one.
+    const answered = () => {
+      this.settingInForce = setting;
+      return false;
+    };
     this.wire?.ask({ trigger }, answered).catch((problem) => {
-      answered();
-      if (!(problem instanceof Refused) || this.unanswered > 0) return; // a lost connection is told elsewhere
+      if (!(problem instanceof Refused) || setting !== this.setting) return; // a lost connection is told elsewhere
       this.isArmed = false;
       this.problem = problem.message;
       this.changed();
