@@ -4,10 +4,12 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <array>
 #include <cerrno>
 #include <chrono>
 #include <cstdio>
 #include <cstdlib>
+#include <memory>
 #include <optional>
 #include <stdexcept>
 #include <string_view>
@@ -111,16 +113,20 @@ struct ReportFiles {
   }
 };
 
-using WriteReport = void (*)(const SuiteResults&, const regression::Sink&);
-
-void write(std::optional<Output>& file, WriteReport report, const SuiteResults& results) {
-  if (!file) return;
-  report(results, [&file](std::string_view text) { file->write(text); });
-  file->flush();
+/// Writes the reports that go into files and need no more than the results.
+void write_files(ReportFiles& files, const SuiteResults& results) {
+  std::vector<std::unique_ptr<regression::Report>> reports;
+  const auto into = [](Output& file) { return [&file](std::string_view text) { file.write(text); }; };
+  if (files.junit) reports.push_back(regression::junit_report(into(*files.junit)));
+  if (files.json) reports.push_back(regression::json_report(into(*files.json)));
+  regression::write_reports(results, reports);
+  for (std::optional<Output>* const file : {&files.junit, &files.json})
+    if (*file) (*file)->flush();
 }
 
-void print(WriteReport report, const SuiteResults& results) {
-  report(results, [](std::string_view text) { fmt::print("{}", text); });
+void print(std::unique_ptr<regression::Report> (*report)(regression::Sink), const SuiteResults& results) {
+  const std::array reports{report([](std::string_view text) { fmt::print("{}", text); })};
+  regression::write_reports(results, reports);
 }
 
 /// The results that a folder has already, and the cases that it lacks.
@@ -260,19 +266,18 @@ int report(const TestOptions& options, SuiteResults results, ReportFiles& files,
     if (files.html) html.add(result);
     see_first(result);
   });
-  write(files.junit, regression::write_junit, results);
-  write(files.json, regression::write_json, results);
+  write_files(files, results);
   if (files.html) {
     files.html->write(html.page(results.suite, results.totals));
     files.html->flush();
   }
   if (options.tap) {
-    print(regression::write_tap, results);
+    print(regression::tap_report, results);
   } else {
     fmt::print("{}; {:.4g} s of the bench{}\n", regression::totals_text(results.totals),
                results.totals.bench_s, remark);
   }
-  if (options.github) print(regression::write_github, results);
+  if (options.github) print(regression::github_report, results);
   return exit_code_of(results.totals);
 }
 

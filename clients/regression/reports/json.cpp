@@ -20,21 +20,33 @@ std::string indented(const std::string& text) {
   return out;
 }
 
+class JsonReport final : public Report {
+ public:
+  using Report::Report;
+
+  void begin(const std::string& suite, const Totals& totals) override {
+    const Json head = {{"suite", suite},          {"passed", totals.passed},   {"failed", totals.failed},
+                       {"errors", totals.errors}, {"invalid", totals.invalid}, {"skipped", totals.skipped}};
+    std::string start = text_of(head);
+    start.erase(start.rfind('\n'));
+    write(start + ",\n \"cases\": [");
+  }
+
+  void add(const CaseResult& result) override {
+    write((is_empty_ ? "\n" : ",\n") + indented(text_of(case_json(result))));
+    is_empty_ = false;
+  }
+
+  void end() override { write(is_empty_ ? "]\n}\n" : "\n ]\n}\n"); }
+
+ private:
+  bool is_empty_ = true;
+};
+
 }  // namespace
 
-void write_json(const SuiteResults& results, const Sink& sink) {
-  const Totals& totals = results.totals;
-  const Json head = {{"suite", results.suite},  {"passed", totals.passed},   {"failed", totals.failed},
-                     {"errors", totals.errors}, {"invalid", totals.invalid}, {"skipped", totals.skipped}};
-  std::string start = text_of(head);
-  start.erase(start.rfind('\n'));
-  sink(start + ",\n \"cases\": [");
-  bool is_first = true;
-  results.each([&](const CaseResult& result) {
-    sink((is_first ? "\n" : ",\n") + indented(text_of(case_json(result))));
-    is_first = false;
-  });
-  sink(is_first ? "]\n}\n" : "\n ]\n}\n");
+std::unique_ptr<Report> json_report(Sink sink) {
+  return std::make_unique<JsonReport>(std::move(sink));
 }
 
 }  // namespace drivebench::regression

@@ -32,17 +32,32 @@ std::string case_xml(const std::string& suite, const CaseResult& result) {
   return inner.empty() ? start + "/>\n" : start + ">\n" + inner + "    </testcase>\n";
 }
 
+class JunitReport final : public Report {
+ public:
+  using Report::Report;
+
+  void begin(const std::string& suite, const Totals& totals) override {
+    suite_ = suite;
+    write(
+        fmt::format("<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<testsuites>\n"
+                    "  <testsuite name=\"{}\" tests=\"{}\" failures=\"{}\" errors=\"{}\" skipped=\"{}\" "
+                    "time=\"{:.6f}\">\n",
+                    markup(suite), totals.all(), totals.failed, totals.errors + totals.invalid,
+                    totals.skipped, totals.bench_s));
+  }
+
+  void add(const CaseResult& result) override { write(case_xml(suite_, result)); }
+
+  void end() override { write("  </testsuite>\n</testsuites>\n"); }
+
+ private:
+  std::string suite_;
+};
+
 }  // namespace
 
-void write_junit(const SuiteResults& results, const Sink& sink) {
-  const Totals& totals = results.totals;
-  sink(fmt::format(
-      "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<testsuites>\n"
-      "  <testsuite name=\"{}\" tests=\"{}\" failures=\"{}\" errors=\"{}\" skipped=\"{}\" time=\"{:.6f}\">\n",
-      markup(results.suite), totals.all(), totals.failed, totals.errors + totals.invalid, totals.skipped,
-      totals.bench_s));
-  results.each([&](const CaseResult& result) { sink(case_xml(results.suite, result)); });
-  sink("  </testsuite>\n</testsuites>\n");
+std::unique_ptr<Report> junit_report(Sink sink) {
+  return std::make_unique<JunitReport>(std::move(sink));
 }
 
 }  // namespace drivebench::regression

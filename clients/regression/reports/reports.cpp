@@ -51,6 +51,50 @@ int line_of(const CaseResult& result) {
   return result.line;
 }
 
+class TapReport final : public Report {
+ public:
+  using Report::Report;
+
+  void begin(const std::string& /*suite*/, const Totals& totals) override {
+    write(fmt::format("TAP version 13\n1..{}\n", totals.all()));
+  }
+
+  void add(const CaseResult& result) override {
+    std::string name = in_a_line(result.name);
+    std::ranges::replace(name, '#', '_');  // begins a directive
+    std::string text = fmt::format("{} {} - {}", is_good(result) ? "ok" : "not ok", ++number_, name);
+    if (result.verdict == Verdict::kSkipped) text += " # SKIP " + in_a_line(result.reason);
+    text += '\n';
+    if (!is_good(result)) {
+      for (const std::string& reason : reasons_of(result))
+        text += fmt::format("# {}: {}\n", word_of(result.verdict), in_a_line(reason));
+    }
+    write(text);
+  }
+
+ private:
+  std::size_t number_ = 0;
+};
+
+class GithubReport final : public Report {
+ public:
+  using Report::Report;
+
+  void begin(const std::string& /*suite*/, const Totals& /*totals*/) override {}
+
+  void add(const CaseResult& result) override {
+    if (is_good(result)) return;
+    std::string reasons;
+    for (const std::string& reason : reasons_of(result))
+      reasons += (reasons.empty() ? "" : "\n") + reason;
+    const std::string title = fmt::format("{} {}", word_of(result.verdict), result.name);
+    write(fmt::format("::{} file={},line={},title={}::{}\n",
+                      result.verdict == Verdict::kInvalid ? "warning" : "error",
+                      escaped_for_github(result.file, true), line_of(result), escaped_for_github(title, true),
+                      escaped_for_github(reasons, false)));
+  }
+};
+
 }  // namespace
 
 void Totals::add(const CaseResult& result) noexcept {
@@ -114,35 +158,24 @@ std::string table_row(const CaseResult& result) {
   return text;
 }
 
-void write_tap(const SuiteResults& results, const Sink& sink) {
-  sink(fmt::format("TAP version 13\n1..{}\n", results.totals.all()));
-  std::size_t number = 0;
-  results.each([&](const CaseResult& result) {
-    std::string name = in_a_line(result.name);
-    std::ranges::replace(name, '#', '_');  // begins a directive
-    std::string text = fmt::format("{} {} - {}", is_good(result) ? "ok" : "not ok", ++number, name);
-    if (result.verdict == Verdict::kSkipped) text += " # SKIP " + in_a_line(result.reason);
-    text += '\n';
-    if (!is_good(result)) {
-      for (const std::string& reason : reasons_of(result))
-        text += fmt::format("# {}: {}\n", word_of(result.verdict), in_a_line(reason));
-    }
-    sink(text);
-  });
+std::unique_ptr<Report> tap_report(Sink sink) {
+  return std::make_unique<TapReport>(std::move(sink));
 }
 
-void write_github(const SuiteResults& results, const Sink& sink) {
-  results.each([&sink](const CaseResult& result) {
-    if (is_good(result)) return;
-    std::string reasons;
-    for (const std::string& reason : reasons_of(result))
-      reasons += (reasons.empty() ? "" : "\n") + reason;
-    const std::string title = fmt::format("{} {}", word_of(result.verdict), result.name);
-    sink(fmt::format("::{} file={},line={},title={}::{}\n",
-                     result.verdict == Verdict::kInvalid ? "warning" : "error",
-                     escaped_for_github(result.file, true), line_of(result), escaped_for_github(title, true),
-                     escaped_for_github(reasons, false)));
+std::unique_ptr<Report> github_report(Sink sink) {
+  return std::make_unique<GithubReport>(std::move(sink));
+}
+
+void write_reports(const SuiteResults& results, std::span<const std::unique_ptr<Report>> reports) {
+  if (reports.empty()) return;
+  for (const std::unique_ptr<Report>& report : reports)
+    report->begin(results.suite, results.totals);
+  results.each([reports](const CaseResult& result) {
+    for (const std::unique_ptr<Report>& report : reports)
+      report->add(result);
   });
+  for (const std::unique_ptr<Report>& report : reports)
+    report->end();
 }
 
 }  // namespace drivebench::regression

@@ -2,8 +2,11 @@
 
 #include <cstddef>
 #include <functional>
+#include <memory>
+#include <span>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "clients/regression/verdicts/result.hpp"
@@ -49,10 +52,34 @@ struct SuiteResults {
   EachResult each;
 };
 
-void write_json(const SuiteResults& results, const Sink& sink);
-void write_junit(const SuiteResults& results, const Sink& sink);
-void write_tap(const SuiteResults& results, const Sink& sink);
+/// A report that is written part by part: what comes before the results, each result, what comes after them.
+class Report {
+ public:
+  explicit Report(Sink sink) : sink_(std::move(sink)) {}
+  virtual ~Report() = default;
+  Report(const Report&) = delete;
+  Report& operator=(const Report&) = delete;
+  Report(Report&&) = delete;
+  Report& operator=(Report&&) = delete;
+
+  virtual void begin(const std::string& suite, const Totals& totals) = 0;
+  virtual void add(const CaseResult& result) = 0;
+  virtual void end() {}
+
+ protected:
+  void write(std::string_view text) const { sink_(text); }
+
+ private:
+  Sink sink_;
+};
+
+std::unique_ptr<Report> json_report(Sink sink);
+std::unique_ptr<Report> junit_report(Sink sink);
+std::unique_ptr<Report> tap_report(Sink sink);
 /// Workflow commands that GitHub shows as annotations: a line for each case that has not passed.
-void write_github(const SuiteResults& results, const Sink& sink);
+std::unique_ptr<Report> github_report(Sink sink);
+
+/// Writes all reports while the results are shown once: reading them again costs the most.
+void write_reports(const SuiteResults& results, std::span<const std::unique_ptr<Report>> reports);
 
 }  // namespace drivebench::regression

@@ -3,17 +3,24 @@
 #include <fmt/core.h>
 
 #include <fstream>
-#include <iterator>
 #include <random>
 #include <stdexcept>
 
 #include "clients/regression/reports/case_json.hpp"
 #include "clients/regression/results/fingerprints.hpp"
+#include "protocols/document.hpp"
 #include "protocols/json.hpp"
 
 namespace drivebench::regression {
 
 namespace fs = std::filesystem;
+namespace {
+
+/// Far more than a result has with its plots and what the device under test printed.
+constexpr std::size_t kMostBytes = std::size_t{256} << 20U;
+
+}  // namespace
+
 ResultsFolder::ResultsFolder(fs::path folder) : folder_(std::move(folder)) {
   fs::create_directories(folder_);
 }
@@ -23,11 +30,10 @@ fs::path ResultsFolder::file_of(const std::string& name) const {
 }
 
 std::optional<CaseResult> ResultsFolder::find(const std::string& name, const std::string& fingerprint) const {
-  std::ifstream in(file_of(name), std::ios::binary);
-  if (!in) return std::nullopt;
-  const std::string text(std::istreambuf_iterator<char>(in), {});
+  const FileText content = read_file(file_of(name), kMostBytes);
+  if (!content.why_not.empty()) return std::nullopt;
   try {
-    const Json file = parse_ordered_json(text);
+    const Json file = parse_ordered_json(content.text);
     if (file.at("fingerprint").get<std::string>() != fingerprint) return std::nullopt;
     CaseResult result = case_of(file.at("case"));
     if (result.name != name) return std::nullopt;

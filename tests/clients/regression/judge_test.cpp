@@ -168,12 +168,12 @@ TEST(Reports, TellEveryVerdict) {
   const std::vector<CaseResult> results = one_of_each();
   EXPECT_EQ(totals_text(suite_results(results).totals), "1 passed, 1 failed, 1 error, 1 invalid, 1 skipped");
   EXPECT_EQ(
-      text_of(write_tap, results),
+      text_of(tap_report, results),
       "TAP version 13\n1..5\nok 1 - a <b>\nnot ok 2 - a <b>\n# fail: speed: at most 5 rad/s, max 4 rad/s, at "
       "0.01 s (line 12)\nnot ok 3 - dead\n# error: ended with code 1\nnot ok 4 - late\n# invalid: 2 ticks "
       "were "
       "late\nok 5 - not _ here # SKIP no board\n");
-  EXPECT_EQ(text_of(write_github, results),
+  EXPECT_EQ(text_of(github_report, results),
             "::error file=a.toml,line=12,title=fail a <b>::speed: at most 5 rad/s, max 4 rad/s, at 0.01 s "
             "(line 12)\n"
             "::error file=d%2C1.toml,line=1,title=error dead::ended with code 1\n"
@@ -182,7 +182,7 @@ TEST(Reports, TellEveryVerdict) {
 
 // Catches: text of a program that breaks the XML, or a failure without its sentence.
 TEST(Reports, JunitEscapesWhatProgramsPrint) {
-  const std::string xml = text_of(write_junit, one_of_each());
+  const std::string xml = text_of(junit_report, one_of_each());
   EXPECT_NE(xml.find("tests=\"5\" failures=\"1\" errors=\"2\" skipped=\"1\""), std::string::npos) << xml;
   EXPECT_NE(xml.find("name=\"a &lt;b&gt;\""), std::string::npos);
   EXPECT_NE(xml.find("<failure type=\"fail\" message=\"speed: at most 5 rad/s"), std::string::npos);
@@ -193,16 +193,33 @@ TEST(Reports, JunitEscapesWhatProgramsPrint) {
 // Catches: a report of parts that are no document together.
 TEST(Reports, JsonOfPartsIsWhatAWholeDocumentWouldBe) {
   for (const auto& results : {one_of_each(), std::vector<CaseResult>(), std::vector<CaseResult>(1)}) {
-    const std::string text = text_of(write_json, results);
+    const std::string text = text_of(json_report, results);
     const auto document = nlohmann::ordered_json::parse(text);
     EXPECT_EQ(document.dump(1) + "\n", text);
     EXPECT_EQ(document.at("cases").size(), results.size());
   }
 }
 
+// Catches: results that are read for each report again, and parts that go into the wrong report.
+TEST(Reports, AreWrittenTogetherFromOneLook) {
+  SuiteResults results = suite_results(one_of_each());
+  int looks = 0;
+  results.each = [&looks, each = results.each](const SeeResult& see) {
+    ++looks;
+    each(see);
+  };
+  std::array<std::string, 2> texts;
+  const auto into = [](std::string& text) { return [&text](std::string_view part) { text += part; }; };
+  const std::array reports{json_report(into(texts[0])), junit_report(into(texts[1]))};
+  write_reports(results, reports);
+  EXPECT_EQ(looks, 1);
+  EXPECT_EQ(texts[0], text_of(json_report, one_of_each()));
+  EXPECT_EQ(texts[1], text_of(junit_report, one_of_each()));
+}
+
 // Catches: a number that JSON does not have.
 TEST(Reports, JsonHasNoNumberThatIsNone) {
-  const std::string json = text_of(write_json, one_of_each());
+  const std::string json = text_of(json_report, one_of_each());
   EXPECT_EQ(json.find("nan"), std::string::npos);
   EXPECT_NE(json.find("\"verdict\": \"invalid\""), std::string::npos);
 }

@@ -1,7 +1,10 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
+#include <memory>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -19,10 +22,10 @@ inline SuiteResults suite_results(std::vector<CaseResult> results) {
 }
 
 /// A report as one text.
-inline std::string text_of(void (*report)(const SuiteResults&, const Sink&),
-                           std::vector<CaseResult> results) {
+inline std::string text_of(std::unique_ptr<Report> (*report)(Sink), std::vector<CaseResult> results) {
   std::string text;
-  report(suite_results(std::move(results)), [&text](std::string_view part) { text += part; });
+  const std::array reports{report([&text](std::string_view part) { text += part; })};
+  write_reports(suite_results(std::move(results)), reports);
   return text;
 }
 

@@ -113,9 +113,9 @@ TEST_F(Results, AreReadAsTheyWereWritten) {
   folder.put(result, "f1");
   const auto read = folder.find("a[x=1]", "f1");
   ASSERT_TRUE(read.has_value());
-  EXPECT_EQ(text_of(write_json, {*read}), text_of(write_json, {result}));
-  EXPECT_EQ(text_of(write_junit, {*read}), text_of(write_junit, {result}));
-  EXPECT_EQ(text_of(write_github, {*read}), text_of(write_github, {result}));
+  EXPECT_EQ(text_of(json_report, {*read}), text_of(json_report, {result}));
+  EXPECT_EQ(text_of(junit_report, {*read}), text_of(junit_report, {result}));
+  EXPECT_EQ(text_of(github_report, {*read}), text_of(github_report, {result}));
   EXPECT_EQ(read->plots, result.plots);
 }
 
