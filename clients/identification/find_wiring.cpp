@@ -217,11 +217,17 @@ WiringFact shift_fact(const MeasuredData& data, const FluxFit& fit, Settings& e,
 
 WiringFact zero_fact(const FluxFit& fit, Settings& e, bool given) {
   WiringFact fact{.name = "zero", .unit = "rad electrical", .given = given};
-  fact.found = fit.zero_rad;
-  fact.interval = kOf95 * fit.zero_deviation;
+  const double interval = kOf95 * fit.zero_deviation;
   const double off = std::remainder(fit.zero_rad - e.zero_rad * e.pole_pairs, 2.0 * std::numbers::pi);
-  fact.contradicts = given && std::abs(off) > fact.interval + kSlackZero_rad;
-  if (!given) e.zero_rad = std::abs(off) > fact.interval + kSlackZero_rad ? fit.zero_rad / e.pole_pairs : 0.0;
+  const bool is_elsewhere = std::abs(off) > interval + kSlackZero_rad;
+  if (interval < std::numbers::pi) {
+    fact.found = fit.zero_rad;
+    fact.interval = interval;
+  } else {
+    fact.remark = "the motor hardly turns, and no induced voltage shows it";
+  }
+  fact.contradicts = given && is_elsewhere;
+  if (!given) e.zero_rad = is_elsewhere ? fit.zero_rad / e.pole_pairs : 0.0;
   e.sensors.zero = !given;
   fact.used = e.zero_rad * e.pole_pairs;
   return fact;

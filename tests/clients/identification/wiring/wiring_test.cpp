@@ -154,6 +154,19 @@ TEST(Wiring, AStandingMotorLeavesPolePairsOpen) {
   EXPECT_NE(fact_of(facts, "pole_pairs").remark, "");
 }
 
+// The first 50 ms of a swing: the shaft turns by less than the encoder's steps can tell from noise. Catches:
+// a zero that is told as found, give or take 1e11 rad.
+TEST(Wiring, AMagnetThatHardlyTurnsLeavesItsZeroOpen) {
+  Case c(MotorKind::kPmSynchronous);
+  c.run.how.processing.from_s = 0.001;
+  c.run.how.processing.to_s = 0.05;
+  const std::vector<WiringFact> facts =
+      find_wiring(c.run.data, c.run.how, {.pole_pairs = true, .direction = true, .zero = true});
+  const WiringFact& zero = fact_of(facts, "zero");
+  EXPECT_FALSE(zero.found.has_value()) << text_of(facts);
+  EXPECT_NE(wiring_text(zero).find("as set; the motor hardly turns"), std::string::npos) << text_of(facts);
+}
+
 // A DC motor that turns steadily at a steady voltage: only the voltages' noise changes. Catches: a shift that
 // noise makes, with a deviation of 0.02 samples from a least squares that takes its columns for exact.
 TEST(Wiring, SteadyVoltagesLeaveTheShiftOpen) {
