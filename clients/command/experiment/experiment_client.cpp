@@ -175,7 +175,7 @@ v1::ExperimentInfo ExperimentClient::fetch(std::uint64_t id, bool recording, con
       info = message.experiment_info();
       show(info, progress);
       last = is_whole();
-      if (!last && interrupted() && !cancelled) {
+      if (!last && queued_ == id && interrupted() && !cancelled) {
         cancelled = true;
         open_link(server_.link, subcommand_).cancel_experiment(id, owner_);
       }

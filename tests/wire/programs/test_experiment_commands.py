@@ -112,7 +112,7 @@ class Commands(WireTest):
         self.assertEqual({path: path.read_bytes() for path in old}, old)
 
     def test_an_interrupted_fetch_ends_and_the_experiment_goes_on(self):
-        """Catches: ctrl-C of a fetch that also ends the experiment."""
+        """Catches: ctrl-C of a fetch that also ends the experiment, whatever message it was reading: rows, or how far it is in the queue."""
         self.start("servo")
         toml = self.path / "e.toml"
         toml.write_text('mode = "realtime"\nduration_s = 110.0\nsignals = ["u_a_v"]\n[input]\nkind = "none"\n', encoding="utf-8")
@@ -125,10 +125,18 @@ class Commands(WireTest):
             _, said = fetching.communicate(timeout=PATIENCE_S)
             self.assertEqual(fetching.returncode, 1, said)
             self.assertIn(f"experiment {number} is not cancelled", said)
-        self.assertEqual([e["state"] for e in json.loads(self.drivebench("list", "--json").stdout)["experiments"]], ["running"])
+        behind = str(json.loads(self.drivebench("run", str(toml), "--json", "--detach").stdout)["id"])
+        fetching = self.popen("fetch", behind, "--out", "behind.csv")
+        until(lambda: catches(signal.SIGINT, fetching), "the program handles the signal")
+        fetching.send_signal(signal.SIGINT)
+        _, said = fetching.communicate(timeout=PATIENCE_S)
+        self.assertIn(f"experiment {behind} is not cancelled", said)
+        states = [e["state"] for e in json.loads(self.drivebench("list", "--json").stdout)["experiments"]]
+        self.assertEqual(states, ["running", "queued"])
         lines = (self.path / "part.csv").read_text(encoding="utf-8").splitlines()
         self.assertEqual([int(line.split(",")[0]) for line in lines[1:]], list(range(len(lines) - 1)))
-        self.assertEqual(self.drivebench("cancel", number).returncode, 0)
+        for each in (behind, number):
+            self.assertEqual(self.drivebench("cancel", each).returncode, 0)
 
     def test_the_secret_of_a_user_is_kept_in_the_folder_of_settings(self):
         """Catches: an empty variable that puts the secret into the current folder."""
