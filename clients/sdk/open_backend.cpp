@@ -2,6 +2,7 @@
 
 #include <dlfcn.h>
 
+#include <cstdlib>
 #include <string>
 
 #include "clients/installation/find_file.hpp"
@@ -9,6 +10,7 @@
 #include "clients/link/modbus/modbus_link.hpp"
 #include "clients/sdk/bus_backend.hpp"
 #include "clients/sdk/link_backend.hpp"
+#include "clients/sdk/link_bridge.hpp"
 
 namespace drivebench::sdk {
 namespace {
@@ -67,11 +69,11 @@ std::unique_ptr<abi::Backend> open_any(std::string_view address, const link::Lin
   return std::make_unique<LinkBackend>(address, options);
 }
 
-}  // namespace
-
-std::unique_ptr<abi::Backend> open_backend(std::string_view address, const link::LinkOptions& options) {
+/// Opens something, and turns what opening throws into OpenError.
+template <class Open>
+auto open_or_fail(Open open) {
   try {
-    return open_any(address, options);
+    return open();
   } catch (const link::AddressError& wrong) {
     throw OpenError(DRIVEBENCH_BAD_ARGUMENT, wrong.what());
   } catch (const link::RefusalError& refusal) {
@@ -83,23 +85,37 @@ std::unique_ptr<abi::Backend> open_backend(std::string_view address, const link:
   }
 }
 
+std::unique_ptr<abi::Bridge> open_inproc_bridge(std::string_view bench, std::uint32_t axis) {
+  int code = DRIVEBENCH_NO_BENCH;
+  std::string error;
+  const std::string file = bench_file(bench);
+  std::unique_ptr<abi::Bridge> bridge(load_inproc_library().open_bridge(file.c_str(), axis, code, error));
+  if (bridge == nullptr) throw OpenError(code, error);
+  return bridge;
+}
+
+/// The token of a bench that wants one comes from the environment, as for the commands.
+std::unique_ptr<abi::Bridge> open_shared_bridge(std::string_view address, std::uint32_t axis) {
+  const char* const token = std::getenv("DRIVEBENCH_TOKEN");
+  return std::make_unique<LinkBridge>(link::parse_address(address), axis,
+                                      link::LinkOptions{.token = token == nullptr ? "" : token});
+}
+
+}  // namespace
+
+std::unique_ptr<abi::Backend> open_backend(std::string_view address, const link::LinkOptions& options) {
+  return open_or_fail([&] { return open_any(address, options); });
+}
+
 std::unique_ptr<abi::Bridge> open_bridge(std::string_view address, std::uint32_t axis) {
-  if (!address.starts_with(kInproc)) {
+  return open_or_fail([&] {
+    if (address.starts_with(kInproc)) return open_inproc_bridge(address.substr(kInproc.size()), axis);
+    if (address.starts_with("shm:")) return open_shared_bridge(address, axis);
     throw OpenError(DRIVEBENCH_NOT_AVAILABLE,
-                    "the gate level works in process only: the address must be "
-                    "inproc:BENCH, not " +
+                    "the gate level works in process and through shared memory: the address must be "
+                    "inproc:BENCH or shm:PATH, not " +
                         std::string(address));
-  }
-  try {
-    int code = DRIVEBENCH_NO_BENCH;
-    std::string error;
-    const std::string file = bench_file(address.substr(kInproc.size()));
-    std::unique_ptr<abi::Bridge> bridge(load_inproc_library().open_bridge(file.c_str(), axis, code, error));
-    if (bridge == nullptr) throw OpenError(code, error);
-    return bridge;
-  } catch (const installation::NotFound& not_found) {
-    throw OpenError(DRIVEBENCH_NO_BENCH, not_found.what());
-  }
+  });
 }
 
 }  // namespace drivebench::sdk

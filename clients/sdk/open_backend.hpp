@@ -24,7 +24,7 @@ class OpenError : public std::runtime_error {
 /// Opens the way that the address names. `options` are for links. Throws OpenError.
 std::unique_ptr<abi::Backend> open_backend(std::string_view address, const link::LinkOptions& options);
 
-/// Opens an axis of "inproc:BENCH" at gate level. Throws OpenError.
+/// Opens an axis of "inproc:BENCH" or of the bench behind "shm:PATH" at gate level. Throws OpenError.
 std::unique_ptr<abi::Bridge> open_bridge(std::string_view address, std::uint32_t axis);
 
 }  // namespace drivebench::sdk

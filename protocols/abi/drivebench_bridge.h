@@ -1,5 +1,6 @@
 /**
- * drivebench_bridge.h: the power stage of a bench at gate level, in the process of the caller.
+ * drivebench_bridge.h: the power stage of a bench at gate level, in the process of the caller or in a server
+ * on the same machine.
  *
  * For host builds of firmware that have a scheduler of their own, such as those of speed controllers. The
  * program sets its legs whenever it likes, their timers play PWM and dead time, and time goes on to any
@@ -11,10 +12,17 @@
  * kind "switched_inverter". Its PWM, command delay, watchdog, lease and scheduled events are not in force:
  * here the caller is the board.
  *
+ * "inproc:BENCH" has the plant in this process. "shm:PATH", optionally with "?spin_us=N" behind it as in
+ * drivebench.h, is the unix socket of a server in lockstep or free mode: the server makes a copy of the axis
+ * for this program alone, from tick 0 on, and carries the calls out in a thread of its own; four programs at
+ * most. The results are the same to the bit. A token that the server asks for comes from the environment,
+ * DRIVEBENCH_TOKEN.
+ *
  * SI units and signs as in drivebench.h, times in picoseconds since the bridge was opened. Every call that
  * can fail returns 0 (DRIVEBENCH_OK) or a code; drivebench_bridge_error() has the sentence, and after a
  * refusal nothing has changed. A bridge belongs to one thread at a time. drivebench_bridge_set(), _run(),
- * _next_edge() and _read() allocate nothing and make no system call.
+ * _next_edge() and _read() allocate nothing; in process they make no system call, and with shared memory none
+ * while both sides are awake.
  */
 #ifndef DRIVEBENCH_BRIDGE_H
 #define DRIVEBENCH_BRIDGE_H
@@ -105,8 +113,8 @@ DRIVEBENCH_API int drivebench_bridge_open_abi(const char* address, uint32_t axis
                                               size_t state_size, size_t means_size,
                                               drivebench_bridge** bridge);
 
-/** Opens axis `axis` of "inproc:BENCH" at gate level, with all legs open. After a failure *bridge is null and
- * drivebench_bridge_error(NULL) says why. */
+/** Opens axis `axis` of "inproc:BENCH" or "shm:PATH" at gate level, with all legs open. After a failure
+ * *bridge is null and drivebench_bridge_error(NULL) says why. */
 static inline int drivebench_bridge_open(const char* address, uint32_t axis, drivebench_bridge** bridge) {
   return drivebench_bridge_open_abi(address, axis, DRIVEBENCH_ABI, sizeof(drivebench_bridge_state),
                                     sizeof(drivebench_bridge_means), bridge);
@@ -128,7 +136,8 @@ DRIVEBENCH_API int drivebench_bridge_set(drivebench_bridge* bridge, uint32_t leg
 DRIVEBENCH_API int drivebench_bridge_run(drivebench_bridge* bridge, uint64_t until_ps,
                                          drivebench_bridge_edge* edges, size_t room, size_t* count,
                                          uint64_t* now_ps);
-/** The first edge up to `limit_ps` if nothing is set before; `*found` 0: there is none. Time stays. */
+/** The first edge up to `limit_ps` if nothing is set before; `*found` 0: there is none. Time stays. A server
+ * looks 1 s ahead at most. */
 DRIVEBENCH_API int drivebench_bridge_next_edge(drivebench_bridge* bridge, uint64_t limit_ps,
                                                drivebench_bridge_edge* edge, int32_t* found);
 

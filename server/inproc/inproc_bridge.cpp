@@ -17,7 +17,6 @@ namespace drivebench {
 namespace {
 
 constexpr std::uint64_t kMagic = 0x3265'6764'7262'6264u;  // "dbbrdge2"
-constexpr std::uint64_t kLastPs = 9'000'000'000'000'000'000u;
 constexpr std::uint64_t kShortestPeriodPs = 100'000;
 constexpr std::uint64_t kLongestPeriodPs = 1'000'000'000'000;
 constexpr std::uint64_t kLongestDeadPs = 1'000'000'000;
@@ -73,9 +72,9 @@ std::string problem_in_leg(const drivebench_leg& s) {
     return "compare_ps is " + std::to_string(s.compare_ps) + " but must be within the period, 0 to " +
            std::to_string(s.period_ps);
   }
-  if (s.period_start_ps > kLastPs) {
+  if (s.period_start_ps > InprocBridge::kLastPs) {
     return "period_start_ps is " + std::to_string(s.period_start_ps) + " but must be at most " +
-           std::to_string(kLastPs);
+           std::to_string(InprocBridge::kLastPs);
   }
   return {};
 }

@@ -21,6 +21,8 @@ class InprocBridge final : public abi::Bridge {
   };
   static Problem problem_with(const BenchConfig& config, std::uint32_t axis);
 
+  static constexpr std::uint64_t kLastPs = 9'000'000'000'000'000'000u;  ///< time goes up to here
+
   /// Without a problem.
   InprocBridge(const BenchConfig& config, std::uint32_t axis);
 

@@ -11,6 +11,8 @@
 
 #include "clients/link/common/file_descriptor.hpp"
 #include "clients/link/common/requests.hpp"
+#include "clients/link/shm/answer_wait.hpp"
+#include "clients/link/shm/mapped_memory.hpp"
 #include "protocols/shm/segment.hpp"
 
 namespace drivebench::link {
@@ -22,9 +24,6 @@ class SharedMemory {
   /// exchange() looks for the answer before it sleeps; `socket` belongs to the session, whose end it shows.
   SharedMemory(const FileDescriptor& memory, FileDescriptor bell, int socket, std::chrono::microseconds spin,
                const std::string& peer);
-  ~SharedMemory();
-  SharedMemory(const SharedMemory&) = delete;
-  SharedMemory& operator=(const SharedMemory&) = delete;
 
   /// The outcome of an exchange.
   enum class Outcome { kSamples, kRefused, kTooLate, kSessionOver };
@@ -36,19 +35,13 @@ class SharedMemory {
   v1::Refusal refusal() const;
 
  private:
-  using Clock = std::chrono::steady_clock;
-
-  bool is_answered() const noexcept { return segment_->reply.number.load() == number_; }
-  Outcome await_answer(std::chrono::milliseconds deadline);
-  Outcome sleep_until_answered(Clock::time_point give_up);
   Outcome outcome();
 
-  std::size_t bytes_;
+  MappedMemory memory_;
+  shm::Segment* segment_;
   std::size_t axes_ = 0;
   FileDescriptor bell_;
-  int socket_;
-  std::chrono::microseconds spin_;
-  shm::Segment* segment_ = nullptr;
+  AnswerWait wait_;
   std::uint32_t number_ = 0;  // of the last exchange
   std::vector<shm::SampleRecord> samples_;
 };

@@ -74,10 +74,25 @@ std::span<const AxisSample> Link::exchange(std::span<const AxisCommand> commands
 }
 
 void Link::share_memory(std::chrono::microseconds spin) {
-  std::vector<FileDescriptor> taken;
-  taken_ = &taken;
   v1::Envelope& request = new_request();
   request.mutable_share_memory()->set_spin_us(static_cast<std::uint32_t>(spin.count()));
+  std::vector<FileDescriptor> taken = ask_for_memory(request, 2);
+  memory_ = std::make_unique<SharedMemory>(taken[0], std::move(taken[1]), socket_.get(), spin, peer_);
+}
+
+std::unique_ptr<BridgeMemory> Link::share_bridge(std::uint32_t axis, std::chrono::microseconds spin) {
+  v1::Envelope& request = new_request();
+  v1::ShareBridge& wanted = *request.mutable_share_bridge();
+  wanted.set_axis(axis);
+  wanted.set_spin_us(static_cast<std::uint32_t>(spin.count()));
+  const std::vector<FileDescriptor> taken = ask_for_memory(request, 1);
+  return std::make_unique<BridgeMemory>(taken[0], socket_.get(), spin, peer_);
+}
+
+/// Returns the descriptors that came with the answer.
+std::vector<FileDescriptor> Link::ask_for_memory(v1::Envelope& request, std::size_t count) {
+  std::vector<FileDescriptor> taken;
+  taken_ = &taken;
   try {
     ask(request, Kind::kSharedMemory);
   } catch (...) {
@@ -85,9 +100,11 @@ void Link::share_memory(std::chrono::microseconds spin) {
     throw;
   }
   taken_ = nullptr;
-  if (taken.size() != 2)
-    fail("sent " + std::to_string(taken.size()) + " descriptors with its shared memory where 2 were due");
-  memory_ = std::make_unique<SharedMemory>(taken[0], std::move(taken[1]), socket_.get(), spin, peer_);
+  if (taken.size() != count) {
+    fail("sent " + std::to_string(taken.size()) + " descriptors with its shared memory where " +
+         std::to_string(count) + " were due");
+  }
+  return taken;
 }
 
 std::ptrdiff_t Link::receive_with_descriptors(std::span<std::byte> space) {

@@ -17,6 +17,7 @@
 
 #include "clients/link/common/address.hpp"
 #include "clients/link/common/requests.hpp"
+#include "clients/link/shm/bridge_memory.hpp"
 #include "clients/link/shm/shared_memory.hpp"
 #include "protocols/framing.hpp"
 
@@ -112,6 +113,10 @@ class Link {
   /// The next message, an ExperimentData or an ExperimentInfo.
   const v1::Envelope& next_of_fetch();
 
+  /// A copy of an axis at gate level, over a unix socket only; both sides look for each other's word for so
+  /// long before they sleep. It lives as long as this link.
+  std::unique_ptr<BridgeMemory> share_bridge(std::uint32_t axis, std::chrono::microseconds spin);
+
   /// The most samples that wait for next_samples(); beyond it the oldest messages are lost and counted as
   /// dropped.
   static constexpr std::size_t kMaxKeptSamples = 65536;
@@ -127,6 +132,7 @@ class Link {
   bool look_before_sleeping(std::span<std::byte> space);
   std::ptrdiff_t receive_with_descriptors(std::span<std::byte> space);
   void share_memory(std::chrono::microseconds spin);
+  std::vector<FileDescriptor> ask_for_memory(v1::Envelope& request, std::size_t count);
   std::span<const AxisSample> exchange_in_memory(std::span<const AxisCommand> commands);
   void keep_waiting_messages();
   std::uint64_t lease(std::uint32_t axis, v1::LeaseRequest::Action action);

@@ -1,3 +1,4 @@
+#include <drivebench_bridge.h>
 #include <fmt/core.h>
 #include <linux/futex.h>
 #include <sys/mman.h>
@@ -7,6 +8,8 @@
 #include <array>
 #include <atomic>
 #include <memory>
+#include <stdexcept>
+#include <string>
 
 #include "clients/command/common/programs/installation.hpp"
 #include "protocols/shm/segment.hpp"
@@ -72,8 +75,27 @@ class FutexPingPong {
   std::uint32_t number_ = 0;
 };
 
+/// A program at gate level in another process than the plant.
+class GateCaller {
+ public:
+  explicit GateCaller(const std::string& address) {
+    if (drivebench_bridge_open(address.c_str(), 0, &bridge_) != DRIVEBENCH_OK)
+      throw std::runtime_error(drivebench_bridge_error(nullptr));
+  }
+  ~GateCaller() { drivebench_bridge_close(bridge_); }
+  GateCaller(const GateCaller&) = delete;
+  GateCaller& operator=(const GateCaller&) = delete;
+
+  /// A run of a picosecond, in which nothing is due.
+  void call() { drivebench_bridge_run(bridge_, now_ + 1, nullptr, 0, nullptr, &now_); }
+
+ private:
+  drivebench_bridge* bridge_ = nullptr;
+  std::uint64_t now_ = 0;
+};
+
 struct Round {
-  Percentiles floor, sleeping, spinning;
+  Percentiles floor, sleeping, spinning, gates;
 };
 
 Row row(const std::string& name, const Rounds<Round>& rounds, Percentiles Round::*way,
@@ -104,6 +126,9 @@ std::vector<Row> measure_shared_memory() {
   FutexPingPong floor;
   Server sleeping_server({bench, "--unix", sleeper});
   Server spinning_server({bench, "--unix", spinner});
+  const std::string board = folder / "gates.socket";
+  Server gate_server({command::find_config("esc").string(), "--mode", "lockstep", "--unix", board});
+  GateCaller gates("shm:" + board + "?spin_us=" + std::to_string(shm::kMaxSpinUs));
   Controller sleeping("shm:" + sleeper + "?spin_us=0");
   Controller spinning("shm:" + spinner + "?spin_us=" + std::to_string(shm::kMaxSpinUs));
   pinned.reset();
@@ -113,7 +138,8 @@ std::vector<Row> measure_shared_memory() {
   const Rounds<Round> rounds = undisturbed_rounds(cpus, kRounds, [&]() -> Round {
     return {.floor = time_exchanges(kBlock, [&] { floor.exchange(); }),
             .sleeping = time_exchanges(kBlock, [&] { sleeping.exchange(); }),
-            .spinning = time_exchanges(kBlock, [&] { spinning.exchange(); })};
+            .spinning = time_exchanges(kBlock, [&] { spinning.exchange(); }),
+            .gates = time_exchanges(kBlock, [&] { gates.call(); })};
   });
   constexpr auto kP50 = &Percentiles::p50;
   constexpr auto kP99 = &Percentiles::p99;
@@ -121,6 +147,8 @@ std::vector<Row> measure_shared_memory() {
   return {row("exchange shm, spinning, p50", rounds, &Round::spinning, kP50,
               Limit{Limit::Kind::kAtMost, kMaxSpinningUs}, "the tick included; floor: bare futex ping-pong"),
           row("exchange shm, spinning, p99", rounds, &Round::spinning, kP99, Limit{kRatio, kMaxP99Ratio}),
+          row("gate level shm, spinning, p50", rounds, &Round::gates, kP50,
+              Limit{Limit::Kind::kAtMost, kMaxSpinningUs}, "a run with nothing due"),
           row("exchange shm, sleeping, p50", rounds, &Round::sleeping, kP50, Limit{kRatio, kMaxP50Ratio}),
           row("exchange shm, sleeping, p99", rounds, &Round::sleeping, kP99, Limit{kRatio, kMaxP99Ratio})};
 }

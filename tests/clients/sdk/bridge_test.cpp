@@ -116,9 +116,10 @@ TEST(Bridge, RefusesWhatCannotBe) {
 TEST(Bridge, OpensOnlyWhatHasGates) {
   drivebench_bridge* bridge = nullptr;
   EXPECT_EQ(drivebench_bridge_open("tcp:localhost:7300", 0, &bridge), DRIVEBENCH_NOT_AVAILABLE);
-  EXPECT_STREQ(drivebench_bridge_error(nullptr),
-               "the gate level works in process only: the address must be inproc:BENCH, not "
-               "tcp:localhost:7300");
+  EXPECT_STREQ(
+      drivebench_bridge_error(nullptr),
+      "the gate level works in process and through shared memory: the address must be inproc:BENCH or "
+      "shm:PATH, not tcp:localhost:7300");
   EXPECT_EQ(drivebench_bridge_open("inproc:" DRIVEBENCH_CONFIGS "/benches/servo.toml", 0, &bridge),
             DRIVEBENCH_WRONG_DRIVE);
   EXPECT_EQ(drivebench_bridge_open(kEsc.c_str(), 1, &bridge), DRIVEBENCH_UNKNOWN_AXIS);

@@ -81,7 +81,8 @@ class Roles(UsersTest):
                      "shaft_bump": pb.ShaftBump(impulse_nms=1.0), "clear_faults": pb.ClearFaults(),
                      "run_experiment": pb.RunExperiment(), "upload_table": pb.UploadTable(),
                      "cancel_experiment": pb.CancelExperiment(id=1), "save_state": pb.SaveState(),
-                     "restore_state": pb.RestoreState(), "reset_bench": pb.ResetBench(), "share_memory": pb.ShareMemory()}
+                     "restore_state": pb.RestoreState(), "reset_bench": pb.ResetBench(), "share_memory": pb.ShareMemory(),
+                     "share_bridge": pb.ShareBridge()}
         asked = {field.name for field in pb.Envelope.DESCRIPTOR.oneofs_by_name["kind"].fields} & {*allowed, *forbidden}
         answers = {"id", "hello", "welcome", "refusal", "done", "exchange_reply", "samples", "parameter_values", "status",
                    "experiment_info", "table_info", "experiment_list", "experiment_data", "notice", "saved_state", "shared_memory", "triggered",

@@ -1,4 +1,4 @@
-"""The gate level: the power stage of a bench in this process, its legs set at any picosecond."""
+"""The gate level: the power stage of a bench in this process or in a server beside it, its legs set at any picosecond."""
 import ctypes
 import enum
 from typing import Any, NamedTuple
@@ -39,7 +39,7 @@ class BridgeEdge(NamedTuple):
 
 
 class Bridge(Opened):
-    """An axis of "inproc:BENCH" at gate level; a context manager, which closes it.
+    """An axis of "inproc:BENCH", or of the server at "shm:PATH", at gate level; a context manager, which closes it.
 
     The drive is of kind "switched_inverter", and all legs are open at first. Times are in picoseconds since the
     opening. Every method raises DrivebenchError, and after a refusal nothing has changed. Several threads may call:

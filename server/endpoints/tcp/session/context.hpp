@@ -18,6 +18,7 @@
 #include "server/endpoints/tcp/sending/outbox.hpp"
 #include "server/endpoints/tcp/sending/spinner.hpp"
 #include "server/endpoints/tcp/session/refusal_log.hpp"
+#include "server/endpoints/tcp/session/shared_memory/shared_bridge.hpp"
 #include "server/endpoints/transport_report.hpp"
 #include "server/engine/engine.hpp"
 #include "server/experiments/experiments.hpp"
@@ -49,6 +50,7 @@ struct SessionContext {
   } counts{};
   OctaveHistogram exchange_times{};  ///< from the arrival of commands to the answer with their samples
   CapturePool captures{};
+  SharedBridges bridges{};
   std::shared_ptr<OutboxPool> outboxes = std::make_shared<OutboxPool>();
   v1::Envelope reply{};              ///< the message that a session is writing
   std::vector<std::byte> scratch{};  ///< its bytes

@@ -33,6 +33,7 @@ constexpr auto kRequestKinds = std::to_array<v1::Envelope::KindCase>({
     v1::Envelope::kSaveState,       v1::Envelope::kRestoreState,
     v1::Envelope::kResetBench,      v1::Envelope::kShareMemory,
     v1::Envelope::kTrigger,         v1::Envelope::kReadCapture,
+    v1::Envelope::kShareBridge,
 });
 
 /// The repeated fields of all requests.

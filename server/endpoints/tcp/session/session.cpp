@@ -36,6 +36,7 @@ Session::Session(Outbox::Socket socket, Client client, SessionContext& context, 
       leases_(dialogue_),
       exchanges_(dialogue_, leases_, subscriptions_),
       shared_exchanges_(dialogue_, exchanges_),
+      gate_level_(dialogue_),
       states_(dialogue_, leases_),
       uploads_(dialogue_),
       fetch_(dialogue_),
@@ -205,6 +206,9 @@ bool Session::dispatch(const v1::Envelope& request) {
     case v1::Envelope::kShareMemory:
       shared_exchanges_.share(request.share_memory());
       break;
+    case v1::Envelope::kShareBridge:
+      gate_level_.share(request.share_bridge());
+      break;
     case v1::Envelope::kStatusRequest:
       report_status(dialogue_);
       break;
@@ -304,6 +308,7 @@ void Session::close() {
   dialogue_.context().places.leave(place_);
   dialogue_.outbox().close();
   shared_exchanges_.close();
+  gate_level_.close();
 }
 
 }  // namespace drivebench

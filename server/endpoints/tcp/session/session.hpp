@@ -18,6 +18,7 @@
 #include "server/endpoints/tcp/session/requests/states.hpp"
 #include "server/endpoints/tcp/session/requests/subscriptions.hpp"
 #include "server/endpoints/tcp/session/requests/uploads.hpp"
+#include "server/endpoints/tcp/session/shared_memory/gate_level.hpp"
 #include "server/endpoints/tcp/session/shared_memory/shared_exchanges.hpp"
 
 namespace drivebench {
@@ -75,6 +76,7 @@ class Session : public std::enable_shared_from_this<Session> {
   Leases leases_;
   Exchanges exchanges_;
   SharedExchanges shared_exchanges_;
+  GateLevel gate_level_;
   States states_;
   Uploads uploads_;
   Fetch fetch_;

@@ -3,24 +3,17 @@
 #include <sched.h>
 
 #include <atomic>
-#include <cerrno>
 #include <exception>
-#include <system_error>
 #include <utility>
 
+#include "protocols/shm/fixed_text.hpp"
 #include "server/config/config.hpp"
+#include "server/endpoints/tcp/session/shared_memory/sharing.hpp"
 
 namespace drivebench {
 namespace {
 
 static_assert(kMaxAxes <= shm::kMaxAxes);
-
-/// Copies a text with a zero behind it; the end of one that is too long is lost.
-template <std::size_t n>
-void copy_text(std::array<char, n>& to, std::string_view from) noexcept {
-  const std::size_t size = from.copy(to.data(), n - 1);
-  to[size] = '\0';
-}
 
 }  // namespace
 
@@ -31,11 +24,13 @@ SharedExchanges::SharedExchanges(Dialogue& dialogue, Exchanges& exchanges)
       bell_(dialogue.socket().get_executor()) {}
 
 void SharedExchanges::share(const v1::ShareMemory& r) {
-  if (!may_share(r)) return;
+  if (!may_share(dialogue_, r.spin_us(), segment_.has_value())) return;
   try {
     segment_.emplace(dialogue_.axis_count());
     bell_.assign(asio::local::stream_protocol(), segment_->take_bell());
-    send_reply();
+    answer_with_memory(dialogue_, segment_->bytes(), [this](std::span<const std::byte> bytes) {
+      return segment_->send_with(dialogue_.socket().native_handle(), bytes);
+    });
   } catch (const std::exception& error) {
     segment_.reset();
     boost::system::error_code ignored;
@@ -45,41 +40,6 @@ void SharedExchanges::share(const v1::ShareMemory& r) {
   spin_ = std::chrono::microseconds(r.spin_us());
   commands_.reserve(shm::kMaxAxes);
   expect();
-}
-
-bool SharedExchanges::may_share(const v1::ShareMemory& r) {
-  const auto refuse = [this](v1::RefusalCode code, const std::string& sentence, const char* field) {
-    dialogue_.refuse(dialogue_.id(), code, sentence, field);
-    return false;
-  };
-  if (dialogue_.client().transport != "unix") {
-    return refuse(v1::REFUSAL_NOT_AVAILABLE,
-                  "memory is shared over the unix socket of the bench only (shm:PATH), not over " +
-                      dialogue_.client().transport,
-                  "kind");
-  }
-  if (r.spin_us() > shm::kMaxSpinUs) {
-    return refuse(
-        v1::REFUSAL_OUT_OF_RANGE,
-        "spin_us is " + std::to_string(r.spin_us()) + " but must be 0 to " + std::to_string(shm::kMaxSpinUs),
-        "spin_us");
-  }
-  if (segment_) return refuse(v1::REFUSAL_BUSY, "this session shares memory already", "kind");
-  if (!dialogue_.outbox().idle()) {
-    return refuse(v1::REFUSAL_BUSY, "the session has not read its earlier answers; then ask again", "kind");
-  }
-  return true;
-}
-
-/// Sends the answer and the descriptors.
-void SharedExchanges::send_reply() {
-  dialogue_.begin_reply(dialogue_.id()).mutable_shared_memory()->set_bytes(segment_->bytes());
-  std::vector<std::byte>& bytes = dialogue_.encode_reply();
-  const std::ptrdiff_t sent =
-      segment_->send_with(dialogue_.socket().native_handle(), bytes.data(), bytes.size());
-  if (sent < 0) throw std::system_error(errno, std::generic_category(), "the socket takes no descriptors");
-  bytes.erase(bytes.begin(), bytes.begin() + sent);
-  if (!bytes.empty()) dialogue_.send_scratch();
 }
 
 void SharedExchanges::close() {
@@ -159,8 +119,8 @@ void SharedExchanges::answer(std::uint64_t id, std::span<const AxisSampleView> s
 void SharedExchanges::refuse(std::uint64_t id, v1::RefusalCode code, const std::string& sentence,
                              const char* field) {
   shm::Reply& reply = segment_->reply();
-  copy_text(reply.sentence, sentence);
-  copy_text(reply.field, field);
+  shm::put_text(reply.sentence, sentence);
+  shm::put_text(reply.field, field);
   reply.count = 0;
   reply.code = static_cast<std::uint64_t>(code);
   publish(id);

@@ -35,8 +35,6 @@ class SharedExchanges final : public Spinner::Door, public Exchanges::Way {
               const char* field) override;
 
  private:
-  bool may_share(const v1::ShareMemory& request);
-  void send_reply();
   bool client_has_own_cpu();
   bool serve();
   void exchange(std::uint32_t number);
