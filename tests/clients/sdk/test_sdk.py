@@ -110,6 +110,8 @@ class Sdk(unittest.TestCase):
         self.assertLess(abs(watt - ampere * volt), 0.01 * watt, said)
         self.assertLess(abs(watt - shaft_watt - copper_watt), 0.01 * watt, said)
         self.assertEqual(said, run_of(SIX_STEP_GATES, "inproc:esc"))
+        with tempfile.TemporaryDirectory() as folder, Server("--unix", f"{folder}/esc.sock", config=BENCHES / "esc.toml"):
+            self.assertEqual(said, run_of(SIX_STEP_GATES, f"shm:{folder}/esc.sock?spin_us=50"))
 
     # The same firmware on the parts of a board: R_ds(on), diodes, shunts, break input. Catches: a key that the bench in process, the
     # server or a replay leaves out, diodes that take no voltage, a break input that trips in a run that is sound.
