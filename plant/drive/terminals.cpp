@@ -199,6 +199,36 @@ bool apply_shorts(const Work& w, const Shorts& shorts, Phases& v) noexcept {
   return short_circuit;
 }
 
+Work work_of(Connection connection, const TerminalDrive& drive, const PhaseValues& current_a,
+             WindingVoltagesOf winding_v, TerminalSet open) noexcept {
+  return {.connection = connection,
+          .drive = drive,
+          .current_a = {current_a.a, current_a.b, current_a.c},
+          .ask = winding_v,
+          .open = open & all_terminals(connection),
+          .count = terminal_count(connection)};
+}
+
+/// Decides which terminals conduct.
+void decide(Work& w, const Shorts& shorts) noexcept {
+  sort_terminals(w);
+  close_shorted(w, shorts);
+  float_terminals(w);
+  close_shorted(w, shorts);
+}
+
+/// The voltages of the terminals where the driven ones are at driven_v.
+Phases terminals_at(const Work& w, const Shorts& shorts, const ThreePhase& driven_v,
+                    bool& short_circuit) noexcept {
+  Phases v = w.voltage_v;
+  const Phases wanted = phases(driven_v);
+  for (int k = 0; k < w.count; ++k) {
+    if (w.driven(k)) v[at(k)] = wanted[at(k)];
+  }
+  short_circuit = apply_shorts(w, shorts, v) || short_circuit;
+  return v;
+}
+
 }  // namespace
 
 TerminalInput open_input(Connection connection, TerminalSet open) noexcept {
@@ -283,26 +313,13 @@ bool diodes_block(Connection connection, const TerminalDrive& drive,
 TerminalCircuit connect(Connection connection, const TerminalDrive& drive, const InjectedFaults& faults,
                         const PhaseValues& current_a, WindingVoltagesOf winding_v,
                         TerminalSet& open) noexcept {
-  Work w{.connection = connection,
-         .drive = drive,
-         .current_a = {current_a.a, current_a.b, current_a.c},
-         .ask = winding_v,
-         .open = open & all_terminals(connection),
-         .count = terminal_count(connection)};
-  sort_terminals(w);
+  Work w = work_of(connection, drive, current_a, winding_v, open);
   const Shorts shorts = shorts_of(faults, w.count);
-  close_shorted(w, shorts);
-  float_terminals(w);
-  close_shorted(w, shorts);
+  decide(w, shorts);
 
   TerminalCircuit circuit{.constant = drive.constant, .dying = w.dying};
   const auto input = [&](const ThreePhase& driven_v, PhaseValues& terminal_v) noexcept {
-    Phases v = w.voltage_v;
-    const Phases wanted = phases(driven_v);
-    for (int k = 0; k < w.count; ++k) {
-      if (w.driven(k)) v[at(k)] = wanted[at(k)];
-    }
-    circuit.short_circuit = apply_shorts(w, shorts, v) || circuit.short_circuit;
+    const Phases v = terminals_at(w, shorts, driven_v, circuit.short_circuit);
     terminal_v = {.a = v[0], .b = v[1], .c = v[2], .field = drive.field_v};
     return circuit_input(w, v);
   };
@@ -319,6 +336,18 @@ TerminalCircuit connect(Connection connection, const TerminalDrive& drive, const
   }
   open = w.open;
   return circuit;
+}
+
+PhaseValues connected_voltages(Connection connection, const TerminalDrive& drive,
+                               const InjectedFaults& faults, const PhaseValues& current_a,
+                               WindingVoltagesOf winding_v, TerminalSet open) noexcept {
+  Work w = work_of(connection, drive, current_a, winding_v, open);
+  const Shorts shorts = shorts_of(faults, w.count);
+  decide(w, shorts);
+  bool short_circuit = false;
+  const Phases v = terminals_at(w, shorts, drive.start_v, short_circuit);
+  const PhaseValues terminal_v{.a = v[0], .b = v[1], .c = v[2], .field = drive.field_v};
+  return drive.switch_ohm == 0.0 ? terminal_v : behind_switches(connection, drive, terminal_v, current_a);
 }
 
 }  // namespace drivebench

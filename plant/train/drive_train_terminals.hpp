@@ -80,10 +80,9 @@ PhaseValues DriveTrain<Machine, Shaft>::end_voltages(const AxisCore& core, const
   }
   TerminalDrive drive = piece_.drive;
   if (!drive.constant) drive.start_v = drive.end_v;
-  TerminalSet open = state.open_terminals;
   const auto ask = [&](const TerminalInput& u) noexcept { return floating_v(x, motion, u); };
-  return connect(core.connection, drive, state.injected, piece_.current_a, WindingVoltagesOf(ask), open)
-      .start_v;
+  return connected_voltages(core.connection, drive, state.injected, piece_.current_a, WindingVoltagesOf(ask),
+                            state.open_terminals);
 }
 
 template <class Machine, class Shaft>
