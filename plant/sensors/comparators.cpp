@@ -109,7 +109,15 @@ class Comparators::Input {
     return (from >= 0.0 && to >= 0.0 && settling >= 0.0) || (from <= 0.0 && to <= 0.0 && settling <= 0.0);
   }
   double along(double t) const noexcept { return constant_v_ + t * (slope_ + t * curve_); }
-  double decay(double t) const noexcept { return exponential(-rate_per_s_ * t); }
+  /// Asked for an instant several times, the last two are kept.
+  double decay(double t) const noexcept {
+    if (t == 0.0) return 1.0;
+    if (t == newest_.at_s) return newest_.decay;
+    if (t == older_.at_s) return older_.decay;
+    older_ = newest_;
+    newest_ = {.at_s = t, .decay = exponential(-rate_per_s_ * t)};
+    return newest_.decay;
+  }
   double slope(double t) const noexcept {
     return slope_ + 2.0 * curve_ * t - (filters() ? rate_per_s_ * transient_v_ * decay(t) : 0.0);
   }
@@ -134,6 +142,12 @@ class Comparators::Input {
   double curve_;
   double transient_v_ = 0.0;
   double rate_per_s_ = 0.0;
+  struct Decay {
+    double at_s = 0.0;
+    double decay = 1.0;
+  };
+  mutable Decay newest_{};
+  mutable Decay older_{};
 };
 
 Comparators::Comparators(const ComparatorParameters& p, double period_s, std::uint64_t seed,
@@ -204,8 +218,8 @@ void Comparators::switch_within(ComparatorMemory& m, const Place& place, const I
   if (p_.noise_rms_v == 0.0) return switch_within(m, place, input, added_v, 0.0, duration_s);
   const auto channel = noise_channel_ + static_cast<std::uint64_t>(place.terminal);
   const auto largest_draw = [&]() noexcept {  // of noise that reaches the threshold
-    const double sigmas = std::max(0.0, away_v(m, place.terminal, span) / p_.noise_rms_v);
-    return (1.0 + 1e-9) * exponential(-0.5 * sigmas * sigmas);
+    const double sigmas = away_v(m, place.terminal, span) / p_.noise_rms_v;
+    return sigmas > 0.0 ? (1.0 + 1e-9) * exponential(-0.5 * sigmas * sigmas) : 1.0;
   };
   double largest = largest_draw();
   const double step_s = period_s_ / static_cast<double>(noise_steps_);
