@@ -139,6 +139,27 @@ class Exchange(WireTest):
             self.assertEqual(replayed.returncode, 0, replayed.stderr)
             self.assertIn("equal, bit for bit", replayed.stdout)
 
+    def test_an_upper_switch_opens_without_its_supply_until_the_lower_one_has_filled_it(self):
+        """Catches: a bench file whose bootstrap_s is not in force, a fault bit that is another one, stays away or stays for ever, a
+        supply that a lower switch of half the time fills."""
+        strong = SERVO_TEXT.replace("over_current_a = 6.0", "over_current_a = 60.0")
+        board = "\n".join((strong, "[axis.machine]", "star = true", "[axis.drive]", 'kind = "switched_inverter"',
+                           "[axis.inverter]", "bootstrap_s = 312.5e-6", "bootstrap_recharge_s = 100e-6",
+                           "[axis.voltage_sensor]", "against_rail = true", ""))
+        client = self.client(self.server(text=board))
+        [empty] = [fault.bit for fault in client.welcome.bench.faults if fault.name == "bootstrap_empty"]
+        client.lease()
+
+        def step(d_a):
+            sample = client.step(client.newest().tick, gates=pb.GATES_DUTY, d_a=d_a)
+            self.assertIn(sample.faults, (0, empty))
+            return round(sample.terminal_a_mean_v / sample.bus_voltage_v, 6), int(sample.faults == empty)
+
+        # The current of a leg that opens goes on through its lower diode: the terminal is at the negative rail.
+        self.assertEqual([step(1.0) for _ in range(4)], [(1.0, 0), (1.0, 0), (0.5, 1), (0.0, 1)])
+        # The lower switch is closed for half of the 125 us of a tick, which fills five eighths: the leg stays off.
+        self.assertEqual([step(0.5), step(1.0), step(0.0), step(1.0)], [(0.0, 1), (0.0, 1), (0.0, 1), (1.0, 0)])
+
     def test_unknown_axes_and_gates_are_refused(self):
         """Catches: an index that is used before it is checked."""
         client = self.client(self.server())
