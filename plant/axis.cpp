@@ -250,6 +250,7 @@ void Axis::end_tick(const MotionState& before, Tick tick) noexcept {
   } else {
     look_inside();
   }
+  if (core_.tap != nullptr) return;  // no sample is read at gate level
   core_.sensors.end_tick(state_.sensors,
                          {.current_a = sensed_currents(),
                           .voltage_v = state_.voltage_v,

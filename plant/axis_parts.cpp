@@ -13,15 +13,14 @@ bool Axis::run_part(const LegLevels& levels, double start_s, double end_s) noexc
   const MotionState before = motion();
   core_.segment_count = 0;
   core_.drive.hold_legs(state_.drive, levels);
-  train_->run_part(core_, state_, start_s, end_s, load_at(core_.tick));
+  const PhaseValues end_a = train_->run_part(core_, state_, start_s, end_s, load_at(core_.tick));
   if (!finite()) {
     hold(before);
     return false;
   }
-  look_inside();
-  check_over_current(core_, state_,
-                     terminal_currents(core_.connection, truth_.current_a, state_.open_terminals));
-  follow_rotor();
+  check_over_current(core_, state_, end_a);
+  // Of the sensors of the position only the count is read.
+  core_.encoder.count(state_.encoder, last_tick(), core_.tick, core_.last_tick_turn, state_.injected);
   return true;
 }
 

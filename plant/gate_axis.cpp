@@ -15,6 +15,22 @@ AxisParameters with_terminals(AxisParameters p) {
   return p;
 }
 
+/// The state but for what stands still at gate level, four fifths of it: the commands of a drive and what the
+/// sensors of a sample hold.
+void copy_but_standing(const AxisState& from, AxisState& to) noexcept {
+  static_assert(std::is_trivially_copyable_v<AxisState>);
+  const auto* const begin = reinterpret_cast<const std::byte*>(&from);
+  const auto copy = [&](const std::byte* first, const std::byte* last) noexcept {
+    std::memcpy(reinterpret_cast<std::byte*>(&to) + (first - begin), first,
+                static_cast<std::size_t>(last - first));
+  };
+  const auto commands = std::as_bytes(std::span(&from.drive.commands, 1));
+  const auto sensors = std::as_bytes(std::span(&from.sensors, 1));
+  copy(begin, commands.data());
+  copy(commands.data() + commands.size(), sensors.data());
+  copy(sensors.data() + sensors.size(), begin + sizeof(AxisState));
+}
+
 double pole_pairs_of_machine(const AxisParameters& p) {
   return std::visit([](const auto& machine) { return pole_pairs_of(machine); }, p.machine);
 }
@@ -35,6 +51,7 @@ GateAxis::GateAxis(const AxisParameters& p, std::int64_t period_ns, int substeps
   log_.reserve(kRoomForEvents);
   axis_.report_to(&tap_);
   clock_.hall_count = hall_.count_at(-p.sensors.hall.offset_rad / pole_pairs_, 0);
+  base_.axis = axis_.state();
   keep(base_);
   told_ = {.levels = axis_.state().comparators.levels, .hall_count = clock_.hall_count};
 }
@@ -59,7 +76,7 @@ Picoseconds GateAxis::grid_after(Picoseconds at) const noexcept {
 void GateAxis::keep(Moment& moment) const {
   moment.clock = clock_;
   moment.sums = tap_.sums;
-  moment.axis = axis_.state();
+  copy_but_standing(axis_.state(), moment.axis);
 }
 
 void GateAxis::go_back(const AxisState& state) {
@@ -256,7 +273,7 @@ std::optional<GateEdge> GateAxis::next_edge(Picoseconds limit) {
 
 GateAxis::Now GateAxis::look() {
   if (clock_.at == now_) return seen();
-  Moment ahead;
+  Moment ahead = base_;
   keep(ahead);
   run_to_now();
   const Now now = seen();
@@ -265,10 +282,10 @@ GateAxis::Now GateAxis::look() {
 }
 
 GateAxis::Now GateAxis::seen() const {
-  Now now{.state = axis_.state(), .truth = axis_.gate_truth(), .sums = tap_.sums};
-  for (std::size_t k = 0; k < now.levels.size(); ++k)
-    now.levels[k] = clock_.legs[k].level();
-  return now;
+  LegLevels levels{};
+  for (std::size_t k = 0; k < levels.size(); ++k)
+    levels[k] = clock_.legs[k].level();
+  return {.state = axis_.state(), .truth = axis_.gate_truth(), .sums = tap_.sums, .levels = levels};
 }
 
 std::vector<std::byte> GateAxis::save() const {

@@ -56,15 +56,21 @@ class GateAxis {
   /// fills `edges`; an empty one asks for none. The number of events written. An event that a change at
   /// `until` itself brings, such as a jump beyond a threshold, belongs to the next run.
   std::size_t run(Picoseconds until, std::span<GateEdge> edges);
+  /// The same if nothing is due up to there; else it does nothing and is false.
+  bool run_idle(Picoseconds until) noexcept {
+    const bool due = clock_.at < until || (passed_ < log_.size() && log_[passed_].edge.at <= until);
+    if (!due) now_ = until;
+    return !due;
+  }
   /// The first event up to `limit` if no leg is set before; changes nothing.
   std::optional<GateEdge> next_edge(Picoseconds limit);
 
   /// At this instant, before what is set at it acts.
   struct Now {
-    AxisState state{};
-    GateTruth truth{};
-    GateSums sums{};
-    LegLevels levels{};
+    AxisState state;
+    GateTruth truth;
+    GateSums sums;
+    LegLevels levels;
   };
   Now look();
   bool diverged() const noexcept { return (axis_.state().faults & kDiverged) != 0; }
@@ -117,7 +123,7 @@ class GateAxis {
     std::uint64_t told_count = 0;
   };
 
-  /// Where the axis is; into place, because a copy has 6 kB.
+  /// Where the axis is, into a moment of this axis: each piece does so, and a whole copy has 6 kB.
   void keep(Moment& moment) const;
   void go_back(const Moment& moment);
   void go_back(const AxisState& state);

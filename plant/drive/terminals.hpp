@@ -78,8 +78,8 @@ TerminalCircuit connect(Connection connection, const TerminalDrive& drive, const
                         const PhaseValues& current_a, WindingVoltagesOf winding_v,
                         TerminalSet& open) noexcept;
 
-/// TerminalCircuit::start_v of connect() alone, for terminals of constant voltage: where an interval has ended
-/// its circuit is not asked for.
+/// TerminalCircuit::start_v of connect() alone, for terminals of constant voltage: where an interval has
+/// ended its circuit is not asked for.
 PhaseValues connected_voltages(Connection connection, const TerminalDrive& drive,
                                const InjectedFaults& faults, const PhaseValues& current_a,
                                WindingVoltagesOf winding_v, TerminalSet open) noexcept;

@@ -78,6 +78,11 @@ struct Encoder::SoundView {
   static int step_into(const EncoderState&) noexcept { return 0; }
 };
 
+/// The same for who asks for counts alone, not for the times of edges.
+struct Encoder::CountView : SoundView {
+  static bool is_still() noexcept { return true; }
+};
+
 /// The last two edges of a tick, the newest first, and the last index.
 struct Encoder::Newest {
   std::array<double, 2> time_s{};
@@ -180,14 +185,28 @@ void Encoder::take(EncoderState& state, const Newest& newest, Tick tick) const n
   state.last_edge_s = newest.time_s[0];
 }
 
-void Encoder::follow(EncoderState& state, std::span<const AngleSegment> segments, Tick tick,
-                     std::int64_t turn, const InjectedFaults& faults) const noexcept {
-  if (segments.empty()) return;
+bool Encoder::is_sound(const InjectedFaults& faults) const noexcept {
   const double size = faults.encoder_swapped + faults.encoder_lost_line + faults.encoder_lost_pulses +
                       faults.encoder_extra_pulses + faults.encoder_index_missing +
                       faults.encoder_eccentricity;
-  if (size == 0.0 && !p_.swapped) {
+  return size == 0.0 && !p_.swapped;
+}
+
+void Encoder::follow(EncoderState& state, std::span<const AngleSegment> segments, Tick tick,
+                     std::int64_t turn, const InjectedFaults& faults) const noexcept {
+  if (segments.empty()) return;
+  if (is_sound(faults)) {
     follow_with(SoundView{}, state, segments, tick, turn);
+  } else {
+    follow_with(view_of(faults), state, segments, tick, turn);
+  }
+}
+
+void Encoder::count(EncoderState& state, std::span<const AngleSegment> segments, Tick tick, std::int64_t turn,
+                    const InjectedFaults& faults) const noexcept {
+  if (segments.empty()) return;
+  if (is_sound(faults)) {
+    follow_with(CountView{}, state, segments, tick, turn);
   } else {
     follow_with(view_of(faults), state, segments, tick, turn);
   }

@@ -71,6 +71,9 @@ class Encoder {
   /// which the tick started.
   void follow(EncoderState& state, std::span<const AngleSegment> segments, Tick tick, std::int64_t turn,
               const InjectedFaults& faults = kNoFaults) const noexcept;
+  /// The same for the count and the index alone: a sound encoder's edges are not located.
+  void count(EncoderState& state, std::span<const AngleSegment> segments, Tick tick, std::int64_t turn,
+             const InjectedFaults& faults) const noexcept;
 
   /// The count at an angle within a turn.
   std::int64_t count_at(double angle_rad, std::int64_t turn) const noexcept;
@@ -128,8 +131,10 @@ class Encoder {
     int step_into(const EncoderState& state) const noexcept;
   };
   struct SoundView;
+  struct CountView;
   struct Newest;
 
+  bool is_sound(const InjectedFaults& faults) const noexcept;
   View view_of(const InjectedFaults& faults) const noexcept;
   template <class AnyView>
   void follow_with(const AnyView& view, EncoderState& state, std::span<const AngleSegment> segments,

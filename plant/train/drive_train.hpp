@@ -31,8 +31,8 @@ class DriveTrain final : public Train {
   }
 
   void run(AxisCore& core, AxisState& state, double load_nm) noexcept override;
-  void run_part(AxisCore& core, AxisState& state, double start_s, double end_s,
-                double load_nm) noexcept override;
+  PhaseValues run_part(AxisCore& core, AxisState& state, double start_s, double end_s,
+                       double load_nm) noexcept override;
   MachineTruth truth(const AxisState& state, const RotorMotion& motion) const noexcept override;
   double stored_energy_j(const AxisState& state, const RotorMotion& motion) const noexcept override {
     return drivebench::stored_energy_j(c_, machine_of(state), turned(motion));
@@ -98,6 +98,13 @@ class DriveTrain final : public Train {
     const State& to;
     const RotorMotion& from_motion;
     const RotorMotion& to_motion;
+  };
+
+  /// What those who follow the terminals through a piece are told.
+  struct Followed {
+    RotorMotion halfway;  ///< middle_motion(), where a comparator or the tap asks for a floating terminal
+    PhaseValues last_v;   ///< of all terminals at its end, before its event
+    PhaseValues end_v;    ///< after it
   };
 
   /// What GateSums integrates, at one instant of a piece.
@@ -194,9 +201,16 @@ class DriveTrain final : public Train {
                  double load_nm) noexcept;
   void finish_piece(AxisCore& core, AxisState& state, const Passed& passed) noexcept;
   /// The terminals against the negative rail during the piece: for comparators, and in the mean voltages.
-  /// `end_v` are those after its event.
   [[gnu::noinline]] void follow_terminals(const AxisCore& core, AxisState& state, const Passed& passed,
-                                          const PhaseValues& end_v) const noexcept;
+                                          const Followed& followed) const noexcept;
+  /// Terminals without a current that no switch holds. One driven terminal of a star alone carries no current
+  /// and does not float.
+  TerminalSet floating_terminals(const AxisCore& core) const noexcept {
+    return piece_.off & ~driven_terminals(core.connection, piece_.drive);
+  }
+  /// Whether after its end the circuit is that of the piece, whose terminals are at `last_v` there: none has
+  /// lost its current, and no diode begins to conduct.
+  bool keeps_circuit(const AxisCore& core, const AxisState& state, const PhaseValues& last_v) const noexcept;
   /// The piece in its middle, by the values at its ends.
   State middle_of(const Passed& passed) const noexcept;
   RotorMotion middle_motion(const Passed& passed) const noexcept;
@@ -206,9 +220,10 @@ class DriveTrain final : public Train {
                              const RotorMotion& motion, const PhaseValues& driven_v) const noexcept;
   Instant instant_of(const AxisCore& core, const State& x, const RotorMotion& motion,
                      const PhaseValues& current_a, const PhaseValues& voltage_v) const noexcept;
-  /// A piece of known currents into GateTap::sums, the terminals' voltages aside.
+  /// A piece of known currents into GateTap::sums, the terminals' voltages aside. `halfway` is its
+  /// middle_motion().
   [[gnu::noinline]] void add_sums(const AxisCore& core, const AxisState& state, const Passed& passed,
-                                  const PhaseValues& from_a) const noexcept;
+                                  RotorMotion halfway, const PhaseValues& from_a) const noexcept;
   /// Currents that have died, into GateTap::events.
   [[gnu::noinline]] void tell_deaths(const AxisCore& core, TerminalSet died, double at_s) const noexcept;
   void end_run(const AxisCore& core, AxisState& state, const State& x, const RotorMotion& motion) noexcept;

@@ -91,13 +91,21 @@ void DriveTrain<Machine, Shaft>::finish_piece(AxisCore& core, AxisState& state,
     piece_.current_a = currents(core, state, to, to_motion);
     if (piece_.switch_ohm != 0.0) take_switch_voltages(core.connection, from_a, piece_.current_a);
     const Measurable before = measurable(core, state, from, from_motion, from_a, piece_.circuit.start_v);
-    const Measurable after =
-        measurable(core, state, to, to_motion, piece_.current_a, end_voltages(core, state, to, to_motion));
+    const bool follows_terminals = core.p.sensors.follow_terminals();
+    Followed followed{};
+    if (follows_terminals)
+      followed.last_v = within_piece_v(core, floating_terminals(core), to, to_motion, piece_.circuit.end_v);
+    followed.end_v = core.tap != nullptr && keeps_circuit(core, state, followed.last_v)
+                         ? followed.last_v
+                         : end_voltages(core, state, to, to_motion);
+    const Measurable after = measurable(core, state, to, to_motion, piece_.current_a, followed.end_v);
     if (core.p.thermal.enabled) {
       state.heat_j += 0.5 * duration_s * (losses_w(c_, from, from_motion) + losses_w(c_, to, to_motion));
     }
-    if (core.p.sensors.follow_terminals()) follow_terminals(core, state, passed, after.voltage_v);
-    if (core.tap != nullptr) add_sums(core, state, passed, from_a);
+    if (core.tap != nullptr || (core.comparators.enabled() && piece_.off != 0))
+      followed.halfway = middle_motion(passed);
+    if (follows_terminals) follow_terminals(core, state, passed, followed);
+    if (core.tap != nullptr) add_sums(core, state, passed, followed.halfway, from_a);
     follow_piece(core, state, start_s, duration_s, piece_.drive, piece_.circuit, before, after);
   }
   core.record({.start_s = start_s,
@@ -234,8 +242,8 @@ void DriveTrain<Machine, Shaft>::run(AxisCore& core, AxisState& state, double lo
 }
 
 template <class Machine, class Shaft>
-void DriveTrain<Machine, Shaft>::run_part(AxisCore& core, AxisState& state, double start_s, double end_s,
-                                          double load_nm) noexcept {
+PhaseValues DriveTrain<Machine, Shaft>::run_part(AxisCore& core, AxisState& state, double start_s,
+                                                 double end_s, double load_nm) noexcept {
   Whole x;
   x.machine = machine_of(state);
   x.shaft = shaft_of(state);
@@ -245,9 +253,10 @@ void DriveTrain<Machine, Shaft>::run_part(AxisCore& core, AxisState& state, doub
   const RotorMotion motion = motion_of(x);
   keep_open(core, state, x.machine, motion);
   piece_.current_a = currents(core, state, x.machine, motion);
-  end_run(core, state, x.machine, motion);
+  if (core.tap == nullptr) end_run(core, state, x.machine, motion);
   keep_machine(state, x.machine);
   keep_shaft(state, x.shaft);
+  return piece_.current_a;
 }
 
 template <class Machine, class Shaft>

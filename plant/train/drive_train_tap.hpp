@@ -26,7 +26,7 @@ auto DriveTrain<Machine, Shaft>::instant_of(const AxisCore& core, const State& x
 
 template <class Machine, class Shaft>
 void DriveTrain<Machine, Shaft>::add_sums(const AxisCore& core, const AxisState& state, const Passed& passed,
-                                          const PhaseValues& from_a) const noexcept {
+                                          RotorMotion halfway, const PhaseValues& from_a) const noexcept {
   const auto& [start_s, duration_s, from, to, from_motion, to_motion] = passed;
   const auto slope_at = [&](const State& x, const RotorMotion& motion, const TerminalInput& u) noexcept {
     return derivative(c_, x, motion,
@@ -36,18 +36,17 @@ void DriveTrain<Machine, Shaft>::add_sums(const AxisCore& core, const AxisState&
   const State from_slope = slope_at(from, from_motion, circuit.start);
   const State to_slope = slope_at(to, to_motion, circuit.constant ? circuit.start : circuit.end);
   const State middle = advanced(middle_of(passed), 0.125 * duration_s, advanced(from_slope, -1.0, to_slope));
-  RotorMotion motion = middle_motion(passed);
   const double turned_rad = to_motion.angle_rad - from_motion.angle_rad;
-  motion.speed_rad_s =
+  halfway.speed_rad_s =
       1.5 * turned_rad / duration_s - 0.25 * (from_motion.speed_rad_s + to_motion.speed_rad_s);
   const PhaseValues middle_a =
-      terminal_currents(core.connection, winding_currents(c_, middle, motion), piece_.off);
+      terminal_currents(core.connection, winding_currents(c_, middle, halfway), piece_.off);
   const Instant a = instant_of(core, from, from_motion, from_a, circuit.start_v);
   const PhaseValues voltage_v =
       piece_.switch_ohm == 0.0 ? middle_v()
                                : behind_switches(core.connection, piece_.drive,
                                                  before_switches(core.connection, circuit.start_v), middle_a);
-  const Instant b = instant_of(core, middle, motion, middle_a, voltage_v);
+  const Instant b = instant_of(core, middle, halfway, middle_a, voltage_v);
   const Instant c = instant_of(core, to, to_motion, piece_.current_a, circuit.end_v);
 
   GateSums& sums = core.tap->sums;

@@ -147,6 +147,19 @@ PhaseValues DriveTrain<Machine, Shaft>::within_piece_v(const AxisCore& core, Ter
 }
 
 template <class Machine, class Shaft>
+bool DriveTrain<Machine, Shaft>::keeps_circuit(const AxisCore& core, const AxisState& state,
+                                               const PhaseValues& last_v) const noexcept {
+  const bool sound = state.injected.phase_short == 0.0 && state.injected.neutral_short == 0.0;
+  if (!piece_.circuit.constant || !sound || state.open_terminals != piece_.off) return false;
+  if (core.connection == Connection::kStar && std::popcount(piece_.off) > 1) return false;
+  const ThreePhase v = phases_of(last_v);
+  const auto blocks = [&](int k, double terminal_v) noexcept {
+    return (piece_.off & terminal_bit(k)) == 0 || std::abs(terminal_v) <= piece_.drive.conducts_above_v();
+  };
+  return blocks(0, v.a) && blocks(1, v.b) && blocks(2, v.c);
+}
+
+template <class Machine, class Shaft>
 auto DriveTrain<Machine, Shaft>::middle_of(const Passed& passed) const noexcept -> State {
   return advanced(passed.from, 0.5, advanced(passed.to, -1.0, passed.from));
 }
@@ -178,10 +191,8 @@ PhaseValues DriveTrain<Machine, Shaft>::middle_v() const noexcept {
 template <class Machine, class Shaft>
 void DriveTrain<Machine, Shaft>::follow_terminals(const AxisCore& core, AxisState& state,
                                                   const Passed& passed,
-                                                  const PhaseValues& end_v) const noexcept {
-  // One driven terminal of a star alone carries no current and does not float.
-  const TerminalSet driven = driven_terminals(core.connection, piece_.drive);
-  const TerminalSet floating = piece_.off & ~driven;
+                                                  const Followed& followed) const noexcept {
+  const TerminalSet floating = floating_terminals(core);
   const double rail_v = piece_.drive.rail_v;
   const auto above = [&](double v) noexcept { return above_negative_rail(core.connection, v, rail_v); };
   const auto against_rail = [&](const ThreePhase& v, TerminalSet afloat) noexcept {
@@ -190,9 +201,8 @@ void DriveTrain<Machine, Shaft>::follow_terminals(const AxisCore& core, AxisStat
     return open_star ? within_rails(result, 2.0 * rail_v, piece_.drive.diode_v) : result;
   };
   const PhaseValues& first_v = piece_.circuit.start_v;
-  const PhaseValues last_v =
-      within_piece_v(core, floating, passed.to, passed.to_motion, piece_.circuit.end_v);
-  if (core.p.sensors.terminals) {
+  const PhaseValues& last_v = followed.last_v;
+  if (core.p.sensors.terminals && core.tap == nullptr) {
     ThreePhase mean_v = phases_of(piece_.circuit.mean_v);
     if ((floating & 1u) != 0) mean_v.a = 0.5 * (first_v.a + last_v.a);
     if ((floating & 2u) != 0) mean_v.b = 0.5 * (first_v.b + last_v.b);
@@ -200,12 +210,15 @@ void DriveTrain<Machine, Shaft>::follow_terminals(const AxisCore& core, AxisStat
     const double part = passed.duration_s / core.timing.period_s;
     const auto add = [part](double sum, double v) noexcept { return sum + part * v; };
     state.terminal_mean_v = by_phase(add, state.terminal_mean_v, against_rail(mean_v, floating));
-    state.terminal_v = against_rail(phases_of(end_v), state.open_terminals & ~driven);
+  }
+  if (core.p.sensors.terminals) {
+    state.terminal_v = against_rail(phases_of(followed.end_v),
+                                    state.open_terminals & ~driven_terminals(core.connection, piece_.drive));
   }
   if (!core.comparators.enabled() && core.tap == nullptr) return;
   const PhaseValues half_v =
       floating == 0 ? middle_v()
-                    : within_piece_v(core, floating, middle_of(passed), middle_motion(passed), middle_v());
+                    : within_piece_v(core, floating, middle_of(passed), followed.halfway, middle_v());
   const TerminalPath path{.start_v = against_rail(phases_of(first_v), floating),
                           .middle_v = against_rail(phases_of(half_v), floating),
                           .end_v = against_rail(phases_of(last_v), floating),

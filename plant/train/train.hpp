@@ -78,9 +78,10 @@ class Train {
   /// All substeps of a tick. `load_nm` is the active load at the output.
   virtual void run(AxisCore& core, AxisState& state, double load_nm) noexcept = 0;
 
-  /// A part of a tick in which the drive has one constant output, without the check of the currents.
-  virtual void run_part(AxisCore& core, AxisState& state, double start_s, double end_s,
-                        double load_nm) noexcept = 0;
+  /// A part of a tick in which the drive has one constant output, without the check of the currents: those of
+  /// the terminals at its end. With AxisCore::tap the voltages of a sample are not worked out.
+  virtual PhaseValues run_part(AxisCore& core, AxisState& state, double start_s, double end_s,
+                               double load_nm) noexcept = 0;
 
   virtual MachineTruth truth(const AxisState& state, const RotorMotion& motion) const noexcept = 0;
   /// In the magnetic field.

@@ -72,9 +72,9 @@ std::string problem_in_leg(const drivebench_leg& s) {
     return "compare_ps is " + std::to_string(s.compare_ps) + " but must be within the period, 0 to " +
            std::to_string(s.period_ps);
   }
-  if (s.period_start_ps > InprocBridge::kLastPs) {
+  if (s.period_start_ps > kLastBridgePs) {
     return "period_start_ps is " + std::to_string(s.period_start_ps) + " but must be at most " +
-           std::to_string(InprocBridge::kLastPs);
+           std::to_string(kLastBridgePs);
   }
   return {};
 }
@@ -114,21 +114,17 @@ InprocBridge::InprocBridge(const BenchConfig& config, std::uint32_t axis)
             config.setup.seed, axis),
       configuration_(configuration_hash(config) + axis) {}
 
-int InprocBridge::check_time(const char* name, std::uint64_t at_ps) noexcept {
+int InprocBridge::refuse_time(const char* name, std::uint64_t at_ps) noexcept {
   if (at_ps < now_ps()) {
     return fail(DRIVEBENCH_OUT_OF_RANGE, std::string(name) + " is " + std::to_string(at_ps) +
                                              " but time is at " + std::to_string(now_ps()) +
                                              " already and does not go back");
   }
-  if (at_ps > kLastPs) {
-    return fail(DRIVEBENCH_OUT_OF_RANGE, std::string(name) + " is " + std::to_string(at_ps) +
-                                             " but must be at most " + std::to_string(kLastPs));
-  }
-  return DRIVEBENCH_OK;
+  return fail(DRIVEBENCH_OUT_OF_RANGE, std::string(name) + " is " + std::to_string(at_ps) +
+                                           " but must be at most " + std::to_string(kLastBridgePs));
 }
 
-int InprocBridge::check_finite() noexcept {
-  if (!axis_.diverged()) return DRIVEBENCH_OK;
+int InprocBridge::refuse_diverged() noexcept {
   return fail(DRIVEBENCH_LATCHED,
               "the machine has diverged: its state grew beyond 1e9; restore a saved state");
 }
@@ -155,10 +151,17 @@ int InprocBridge::run(std::uint64_t until_ps, std::span<drivebench_bridge_edge> 
   count = 0;
   if (const int code = check_time("until_ps", until_ps); code != DRIVEBENCH_OK) return code;
   const auto until = static_cast<Picoseconds>(until_ps);
+  if (axis_.run_idle(until)) return check_finite();
   if (edges.empty()) {
     axis_.run(until, {});
-    return check_finite();
+  } else {
+    run_with(edges, until, count);
   }
+  return check_finite();
+}
+
+void InprocBridge::run_with(std::span<drivebench_bridge_edge> edges, Picoseconds until,
+                            std::size_t& count) noexcept {
   std::array<GateEdge, 16> some;
   while (count < edges.size()) {
     const std::span<GateEdge> room = std::span(some).first(std::min(some.size(), edges.size() - count));
@@ -167,7 +170,6 @@ int InprocBridge::run(std::uint64_t until_ps, std::span<drivebench_bridge_edge> 
       edges[count++] = edge_of(room[n]);
     if (written < room.size()) break;
   }
-  return check_finite();
 }
 
 int InprocBridge::next_edge(std::uint64_t limit_ps, drivebench_bridge_edge& edge, bool& found) noexcept {

@@ -11,6 +11,9 @@
 
 namespace drivebench {
 
+/// The last instant to which a bridge goes.
+inline constexpr std::uint64_t kLastBridgePs = 9'000'000'000'000'000'000u;
+
 /// An axis of a bench at gate level, behind the C ABI.
 class InprocBridge final : public abi::Bridge {
  public:
@@ -20,8 +23,6 @@ class InprocBridge final : public abi::Bridge {
     std::string sentence;
   };
   static Problem problem_with(const BenchConfig& config, std::uint32_t axis);
-
-  static constexpr std::uint64_t kLastPs = 9'000'000'000'000'000'000u;  ///< time goes up to here
 
   /// Without a problem.
   InprocBridge(const BenchConfig& config, std::uint32_t axis);
@@ -59,8 +60,15 @@ class InprocBridge final : public abi::Bridge {
   };
 
   /// A time that is to come.
-  int check_time(const char* name, std::uint64_t at_ps) noexcept;
-  int check_finite() noexcept;
+  int check_time(const char* name, std::uint64_t at_ps) noexcept {
+    return at_ps >= now_ps() && at_ps <= kLastBridgePs ? DRIVEBENCH_OK : refuse_time(name, at_ps);
+  }
+  int refuse_time(const char* name, std::uint64_t at_ps) noexcept;
+  int check_finite() noexcept { return axis_.diverged() ? refuse_diverged() : DRIVEBENCH_OK; }
+  int refuse_diverged() noexcept;
+  /// Runs to `until` or until the room for edges is full; `count` of them are written.
+  [[gnu::noinline]] void run_with(std::span<drivebench_bridge_edge> edges, Picoseconds until,
+                                  std::size_t& count) noexcept;
   Mark mark_of_now() noexcept;
   std::vector<double> live_values() const;
   /// Whether the values are possible ones; else nothing has changed.

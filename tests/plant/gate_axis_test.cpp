@@ -7,6 +7,7 @@
 #include <random>
 #include <vector>
 
+#include "plant/drive/phases.hpp"
 #include "tests/plant/bridge_rig.hpp"
 
 namespace drivebench {
@@ -142,6 +143,47 @@ TEST(GateAxis, LevelsAlternateWhereverLegsAreSet) {
   EXPECT_EQ(now.state.comparators.levels, levels);
   EXPECT_EQ(now.state.comparators.edges, edges);
   EXPECT_GT(edges[0], 100U);
+}
+
+// Catches: a count that stands still, or one that a part which was taken back has moved.
+TEST(GateAxis, TheEncoderCountsTheAngle) {
+  AxisParameters p = turning_motor();
+  p.encoder.counts_per_revolution = 4096;
+  const Encoder encoder(p.encoder, 1e-9 * kPeriodNs);
+  Course course(p);
+  for (int n = 0; n < kSteps; ++n) {
+    course.set_step(n % 6);
+    course.run((n + 1) * kStep, 64);
+    const AxisState state = course.axis.look().state;
+    ASSERT_EQ(state.encoder.count, encoder.count_at(state.shaft.angle_rad, state.turns)) << n;
+  }
+  EXPECT_GT(std::abs(course.axis.look().state.encoder.count), 1000);
+}
+
+// The mean of a nanosecond is within 10 mV of the voltages at its ends, unless a switch or a diode changes in
+// it: the emf and the current of the diodes go by far less. Catches: terminals that are read as they were at
+// the end of another part, or before a current has died.
+TEST(GateAxis, TheTerminalsThatAreReadAreThoseThatAreIntegrated) {
+  constexpr Picoseconds kNano = 1'000;
+  Course course(turning_motor());
+  std::mt19937_64 random(11);
+  std::uniform_int_distribution<Picoseconds> part(1, 40 * kMicro);
+  int compared = 0;
+  for (int n = 0; n < 1000; ++n) {
+    course.set_step(n / 40 % 6);
+    course.run(course.axis.now() + part(random), 8);
+    const GateAxis::Now from = course.axis.look();
+    course.run(course.axis.now() + kNano, 8);
+    const GateAxis::Now to = course.axis.look();
+    const auto mean_v = [](double first_vs, double last_vs) { return (last_vs - first_vs) / 1e-9; };
+    const ThreePhase v = by_phase(mean_v, from.sums.terminal_vs, to.sums.terminal_vs);
+    if (from.levels != to.levels || from.state.open_terminals != to.state.open_terminals) continue;
+    ASSERT_NEAR(v.a, to.state.terminal_v.a, 10e-3) << n;
+    ASSERT_NEAR(v.b, to.state.terminal_v.b, 10e-3) << n;
+    ASSERT_NEAR(v.c, to.state.terminal_v.c, 10e-3) << n;
+    ++compared;
+  }
+  EXPECT_GT(compared, 900);
 }
 
 // The closed form of R and L with a constant voltage between two legs: i = U/(2R) (1 - exp(-t/T)). Catches: a

@@ -133,7 +133,7 @@ int SharedBridge::run(std::uint64_t until_ps, std::uint64_t room) noexcept {
   std::size_t count = 0;
   for (;;) {
     const std::uint64_t now_ps = bridge_.now_ps();
-    const bool is_refused = until_ps < now_ps || until_ps > InprocBridge::kLastPs;
+    const bool is_refused = until_ps < now_ps || until_ps > kLastBridgePs;
     const bool is_last = is_refused || until_ps - now_ps <= kPartPs;
     std::size_t more = 0;
     const int code = bridge_.run(is_last ? until_ps : now_ps + kPartPs, edges.subspan(count), more);
