@@ -156,6 +156,25 @@ TEST(Bridge, GoesToTheNextEvent) {
   EXPECT_EQ(now_ps, 5000 * kMicro);
 }
 
+// Catches: a run with nothing due that passes an edge, which then comes late.
+TEST(Bridge, AnEdgeComesInTheRunThatPassesIt) {
+  Bridge bridge;
+  bridge.align();
+  int edges = 0;
+  for (std::uint64_t now_ps = 0; now_ps < 5000 * kMicro;) {
+    const std::uint64_t before_ps = now_ps;
+    std::array<drivebench_bridge_edge, 16> seen;
+    std::size_t count = 0;
+    ASSERT_EQ(drivebench_bridge_run(bridge.handle, before_ps + kMicro / 2, seen.data(), seen.size(), &count,
+                                    &now_ps),
+              DRIVEBENCH_OK);
+    for (std::size_t n = 0; n < count; ++n)
+      EXPECT_GE(seen[n].at_ps, before_ps);
+    edges += static_cast<int>(count);
+  }
+  EXPECT_GT(edges, 20);
+}
+
 // Catches: a mean of another interval than that since the mark, an energy that does not belong to it.
 TEST(Bridge, MeansCountFromTheMark) {
   Bridge bridge;
