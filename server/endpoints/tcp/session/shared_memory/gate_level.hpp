@@ -2,8 +2,8 @@
 
 #include <memory>
 
+#include "server/endpoints/tcp/memory/shared_bridge.hpp"
 #include "server/endpoints/tcp/session/dialogue.hpp"
-#include "server/endpoints/tcp/session/shared_memory/shared_bridge.hpp"
 
 namespace drivebench {
 

@@ -9,10 +9,10 @@
 #include <string>
 #include <vector>
 
+#include "server/endpoints/tcp/memory/shared_segment.hpp"
 #include "server/endpoints/tcp/sending/spinner.hpp"
 #include "server/endpoints/tcp/session/dialogue.hpp"
 #include "server/endpoints/tcp/session/requests/exchanges.hpp"
-#include "server/endpoints/tcp/session/shared_memory/shared_segment.hpp"
 
 namespace drivebench {
 

@@ -1,4 +1,4 @@
-#include "server/endpoints/tcp/session/shared_memory/shared_segment.hpp"
+#include "server/endpoints/tcp/memory/shared_segment.hpp"
 
 #include <sys/socket.h>
 #include <unistd.h>

@@ -3,7 +3,7 @@
 #include <cstddef>
 
 #include "protocols/shm/segment.hpp"
-#include "server/endpoints/tcp/session/shared_memory/sealed_memory.hpp"
+#include "server/endpoints/tcp/memory/sealed_memory.hpp"
 
 namespace drivebench {
 

@@ -10,7 +10,7 @@
 
 #include "protocols/shm/bridge_segment.hpp"
 #include "server/config/config.hpp"
-#include "server/endpoints/tcp/session/shared_memory/sealed_memory.hpp"
+#include "server/endpoints/tcp/memory/sealed_memory.hpp"
 #include "server/inproc/inproc_bridge.hpp"
 
 namespace drivebench {

@@ -1,4 +1,4 @@
-#include "server/endpoints/tcp/session/shared_memory/shared_bridge.hpp"
+#include "server/endpoints/tcp/memory/shared_bridge.hpp"
 
 #include <sched.h>
 

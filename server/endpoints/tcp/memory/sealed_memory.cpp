@@ -1,4 +1,4 @@
-#include "server/endpoints/tcp/session/shared_memory/sealed_memory.hpp"
+#include "server/endpoints/tcp/memory/sealed_memory.hpp"
 
 #include <fcntl.h>
 #include <sys/mman.h>
