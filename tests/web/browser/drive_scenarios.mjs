@@ -4,6 +4,16 @@ export function driveScenarios({ axeFinds, enter, outside, pictureOf, press, set
   const now = (page, pattern) => text(page, "#drive .value", pattern);
   const tickOf = async (page) => Number(await stateOf(page, "tick", /^\d+$/));
 
+  /** The tick at which the time stands: the page may show some ticks before it. */
+  async function standingTick(page) {
+    await until(async () => {
+      const first = await tickOf(page);
+      await new Promise((done) => setTimeout(done, 1200));
+      return String((await tickOf(page)) - first);
+    }, /^0$/);
+    return tickOf(page);
+  }
+
   /** Fills in a V/f start. */
   async function fill(page, values) {
     await stateOf(page, "tick", /\d/);
@@ -29,15 +39,11 @@ export function driveScenarios({ axeFinds, enter, outside, pictureOf, press, set
       await press(page, "Release the lease");
       const kept = await text(page, "#knobs .answer", /lease/);
       await press(page, "Hold the time");
-      await until(async () => {
-        const first = await tickOf(page);
-        await new Promise((done) => setTimeout(done, 1200));
-        return String((await tickOf(page)) - first);
-      }, /^0$/);
-      const held = await tickOf(page);
+      const held = await standingTick(page);
       await set(page, "ticks of a step", "7");
       await press(page, "Step");
-      const stepped = await stateOf(page, "tick", new RegExp(`^(?!${held}$)\\d+$`));
+      await stateOf(page, "tick", new RegExp(`^(?!${held}$)\\d+$`));
+      const steps = (await standingTick(page)) - held;
       await press(page, "Let the time run");
       await page.focus(".panes");
       await page.keyboard.press("Escape");
@@ -49,7 +55,7 @@ export function driveScenarios({ axeFinds, enter, outside, pictureOf, press, set
       const given = await answer(page, /given back/);
       const isStopShown = () => page.$eval("#stop", (each) => String(!each.hidden));
       await until(isStopShown, /false/);
-      return { before, owner, arrived, speed, bump, kept, steps: Number(stepped) - held, stopped, off, given, free: await stateOf(page, "controller", /none/) };
+      return { before, owner, arrived, speed, bump, kept, steps, stopped, off, given, free: await stateOf(page, "controller", /none/) };
     },
 
     /** Real time: the page goes while the motor turns. */
