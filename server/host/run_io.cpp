@@ -3,14 +3,14 @@
 namespace drivebench {
 
 void run_io(asio::io_context& io, std::chrono::microseconds spin) {
-  using Clock = std::chrono::steady_clock;  // short times of the host, in simulated time too
+  using HostClock = std::chrono::steady_clock;  // short times of the host, in simulated time too
   if (spin.count() == 0) {
     io.run();
     return;
   }
   while (io.run_one() != 0) {
-    for (Clock::time_point end = Clock::now() + spin; !io.stopped() && Clock::now() < end;) {
-      if (io.poll() != 0) end = Clock::now() + spin;
+    for (HostClock::time_point end = HostClock::now() + spin; !io.stopped() && HostClock::now() < end;) {
+      if (io.poll() != 0) end = HostClock::now() + spin;
     }
   }
 }
