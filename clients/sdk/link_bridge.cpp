@@ -33,11 +33,9 @@ int LinkBridge::ask(const shm::BridgeArguments& call, Take take) noexcept {
     memory_->call([&](const shm::BridgeReply& reply) {
       code = static_cast<int>(reply.code);
       now_ps_ = reply.now_ps;
-      if (code == DRIVEBENCH_OK) {
-        take(reply);
-      } else {
-        sentence = shm::text_in(reply.sentence);
-      }
+      // A run in which the machine diverges has edges as well.
+      if (code == DRIVEBENCH_OK || code == DRIVEBENCH_LATCHED) take(reply);
+      if (code != DRIVEBENCH_OK) sentence = shm::text_in(reply.sentence);
     });
     return code == DRIVEBENCH_OK ? DRIVEBENCH_OK : fail(code, std::move(sentence));
   } catch (const link::LinkError& lost) {
@@ -76,7 +74,7 @@ int LinkBridge::run(std::uint64_t until_ps, std::span<drivebench_bridge_edge> ed
           std::copy_n(reply.edges.begin(), more, edges.begin() + static_cast<std::ptrdiff_t>(count));
         });
     count += more;
-    const bool goes_on = code == DRIVEBENCH_OK && more == room && more != 0 && count < edges.size();
+    const bool goes_on = more == room && more != 0 && count < edges.size();
     if (!goes_on) return code;
   }
 }

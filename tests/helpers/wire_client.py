@@ -1,4 +1,5 @@
 """A server process and a blocking client for the wire tests: frames of bench.proto over TCP or a unix socket."""
+import array
 import atexit
 import importlib
 import json
@@ -167,6 +168,17 @@ class Client:
         self.last_id += 1
         self.send_bytes(frame(pb.Envelope(id=self.last_id, **kind).SerializeToString()))
         return self.last_id
+
+    def ask_for_descriptors(self, **kind):
+        """The answer, and the descriptors that came with its first byte; the caller closes them."""
+        number = self.send(**kind)
+        data, rights, _, _ = self.socket.recvmsg(1 << 16, socket.CMSG_SPACE(8 * 4))
+        self.buffer += data
+        descriptors = array.array("i")
+        for level, meaning, content in rights:
+            if (level, meaning) == (socket.SOL_SOCKET, socket.SCM_RIGHTS):
+                descriptors.frombytes(content)
+        return self.answer_to(number), descriptors
 
     def receive_bytes(self, count):
         while len(self.buffer) < count:

@@ -12,6 +12,7 @@ from wire_client import BENCHES, PATIENCE_S, REPOSITORY, Server, pb
 SERVO_TEXT = (BENCHES / "servo.toml").read_text(encoding="utf-8").replace("../motors/", f"{REPOSITORY}/configs/motors/")
 # A busy machine is no silent controller.
 PATIENT_TEXT = SERVO_TEXT.replace("watchdog_ticks = 20", "watchdog_ticks = 400000").replace("lease_s = 2.0", "lease_s = 60.0")
+ESC_TEXT = (BENCHES / "esc.toml").read_text(encoding="utf-8").replace("../motors/", f"{REPOSITORY}/configs/motors/")
 TWO_AXES = SERVO_TEXT + SERVO_TEXT[SERVO_TEXT.index("[[axis]]"):].replace('name = "servo"', 'name = "second"', 1)
 
 # A servo on a current amplifier, and a machine with three phases beside it.
@@ -65,6 +66,10 @@ class WireTest(unittest.TestCase):
         server = self.server("--record", str(folder / "run.mcap"),
                              before=lambda: resource.setrlimit(resource_kind, (limit, limit)))
         return server, folder
+
+    def gates(self, mode="lockstep", text=ESC_TEXT):
+        """A server whose drive has gates, with a unix socket."""
+        return self.server("--mode", mode, text=text, unix=True)
 
     def client(self, server, **options):
         client = server.client(**options)

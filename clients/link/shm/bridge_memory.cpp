@@ -8,6 +8,13 @@
 #include "protocols/shm/futex.hpp"
 
 namespace drivebench::link {
+namespace {
+
+[[noreturn]] void fail_ended(const std::string& peer) {
+  throw LinkError(peer + " closed the connection");
+}
+
+}  // namespace
 
 BridgeMemory::BridgeMemory(const FileDescriptor& memory, int socket, std::chrono::microseconds spin,
                            std::string peer)
@@ -31,13 +38,12 @@ void BridgeMemory::ask() {
   if (reply.asleep.load() != 0) shm::wake(request.number);
   const bool may_spin = reply.cpu != request.cpu;
   const AnswerWait::End end = wait_.await(reply.number, number_, request.waits, may_spin, std::nullopt);
-  if (end != AnswerWait::End::kAnswered) throw LinkError(peer_ + " closed the connection");
+  if (end != AnswerWait::End::kAnswered) fail_ended(peer_);
 }
 
 void BridgeMemory::require_memory() {
   std::uint32_t number = number_;  // an exchange is not moved before what was read, as a plain load could be
-  if (!segment_.reply.number.compare_exchange_strong(number, number))
-    throw LinkError(peer_ + " closed the connection");
+  if (!segment_.reply.number.compare_exchange_strong(number, number)) fail_ended(peer_);
 }
 
 }  // namespace drivebench::link

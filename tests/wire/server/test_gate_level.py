@@ -19,22 +19,18 @@ except ImportError:
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[2] / "helpers"))
 import python_package  # noqa: E402, F401
-from wire_client import BENCHES, PATIENCE_S, REPOSITORY  # noqa: E402
-from wire_test import PATIENT_TEXT, WireTest  # noqa: E402
+from wire_client import PATIENCE_S  # noqa: E402
+from wire_test import ESC_TEXT, PATIENT_TEXT, WireTest  # noqa: E402
 
 import drivebench  # noqa: E402
 from drivebench import Code, LegMode  # noqa: E402
 
 MICRO, SECOND = 10**6, 10**12
-ESC = (BENCHES / "esc.toml").read_text(encoding="utf-8").replace("../motors/", f"{REPOSITORY}/configs/motors/")
 USERS = "".join(f'[[token]]\nname = "{name}"\nrole = "{role}"\ntoken = "{name}-secret"\n'
                 for name, role in (("vera", "viewer"), ("otto", "operator")))
 
 
 class GateLevel(WireTest):
-    def gates(self, mode="lockstep", text=ESC):
-        return self.server("--mode", mode, text=text, unix=True)
-
     def bridge(self, address):
         bridge = drivebench.Bridge(address)
         self.addCleanup(bridge.close)
@@ -96,7 +92,7 @@ class GateLevel(WireTest):
         self.addCleanup(shutil.rmtree, folder, ignore_errors=True)
         (folder / "tokens").write_text(USERS, encoding="utf-8")
         (folder / "tokens").chmod(0o600)
-        server = self.gates(text=f'{ESC}\n[tcp]\ntokens_file = "{folder}/tokens"\n')
+        server = self.gates(text=f'{ESC_TEXT}\n[tcp]\ntokens_file = "{folder}/tokens"\n')
         for token, code in (("vera-secret", Code.FORBIDDEN), ("otto-secret", None), ("wrong", Code.UNAUTHENTICATED)):
             with self.subTest(token), unittest.mock.patch.dict(os.environ, {"DRIVEBENCH_TOKEN": token}):
                 if code is None:
@@ -137,6 +133,18 @@ class GateLevel(WireTest):
         thread.join(PATIENCE_S)
         self.assertFalse(thread.is_alive())
         self.assertEqual([error.code for error in told], [Code.LINK_LOST])
+    def test_a_machine_that_diverges_ends_where_it_does_in_process(self):
+        """Catches: a run whose part is taken for the whole once the machine has diverged, another code."""
+        server = self.gates()
+        ends = []
+        for address in ("inproc:esc", f"shm:{server.unix_path}"):
+            bridge = self.bridge(address)
+            bridge.set_load(1e5)
+            with self.assertRaisesRegex(drivebench.DrivebenchError, "diverged") as refused:
+                bridge.run(3000 * MICRO, room=5000)
+            ends.append((refused.exception.code, bytes(bridge.read())))
+        self.assertEqual(*ends)
+
 
 if __name__ == "__main__":
     unittest.main(verbosity=2)

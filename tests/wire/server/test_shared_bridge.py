@@ -1,13 +1,11 @@
 #!/usr/bin/python3
 """The memory of a bridge at gate level, which a session shares with a server: refusals, hostile content, ends."""
-import array
 import ctypes
 import mmap
 import os
 import pathlib
 import platform
 import random
-import socket
 import struct
 import sys
 import time
@@ -20,11 +18,10 @@ except ImportError:
     sys.exit(77)
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[2] / "helpers"))
-from wire_client import BENCHES, PATIENCE_S, REPOSITORY, Client, pb
-from wire_test import PATIENT_TEXT, WireTest, until
+from wire_client import PATIENCE_S, Client, pb
+from wire_test import ESC_TEXT, PATIENT_TEXT, WireTest, until
 
 MICRO, SECOND = 10**6, 10**12
-ESC = (BENCHES / "esc.toml").read_text(encoding="utf-8").replace("../motors/", f"{REPOSITORY}/configs/motors/")
 # protocols/shm/bridge_segment.hpp
 REQUEST, ARGUMENTS = 64, struct.Struct("=QQQdIIQQQQ128s")
 REPLY = (REQUEST + 16 + ARGUMENTS.size + 63) // 64 * 64
@@ -37,14 +34,7 @@ class Raw(Client):
     memory = None
 
     def share(self, **asked):
-        number = self.send(share_bridge=pb.ShareBridge(**asked))
-        data, rights, _, _ = self.socket.recvmsg(1 << 16, socket.CMSG_SPACE(8 * 4))
-        self.buffer += data
-        answer = self.answer_to(number)
-        descriptors = array.array("i")
-        for level, kind, content in rights:
-            if (level, kind) == (socket.SOL_SOCKET, socket.SCM_RIGHTS):
-                descriptors.frombytes(content)
+        answer, descriptors = self.ask_for_descriptors(share_bridge=pb.ShareBridge(**asked))
         if answer.WhichOneof("kind") == "shared_memory":
             self.memory = mmap.mmap(descriptors[0], answer.shared_memory.bytes)
             self.asked = ctypes.c_uint32.from_buffer(self.memory, REQUEST)
@@ -87,9 +77,6 @@ class Raw(Client):
 
 
 class SharedBridge(WireTest):
-    def gates(self, mode="lockstep", text=ESC):
-        return self.server("--mode", mode, text=text, unix=True)
-
     def raw(self, server):
         client = Raw(server.raw(unix=True), True)
         self.addCleanup(client.close)
@@ -106,7 +93,7 @@ class SharedBridge(WireTest):
         self.assertRefused(client.share(spin_us=101), pb.REFUSAL_OUT_OF_RANGE, "spin_us")
         self.assertEqual(client.share().WhichOneof("kind"), "shared_memory")
         self.assertRefused(client.share(), pb.REFUSAL_BUSY, "kind")
-        for mode, text, code, field in (("realtime", ESC, pb.REFUSAL_WRONG_MODE, "kind"),
+        for mode, text, code, field in (("realtime", ESC_TEXT, pb.REFUSAL_WRONG_MODE, "kind"),
                                         ("lockstep", PATIENT_TEXT, pb.REFUSAL_WRONG_DRIVE, "axis")):
             other = Raw(self.gates(mode, text).raw(unix=True), True)
             self.addCleanup(other.close)

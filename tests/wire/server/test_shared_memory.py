@@ -1,6 +1,5 @@
 #!/usr/bin/python3
 """Exchanges in memory that a session shares with the bench: hostile content, ends and limits."""
-import array
 import ctypes
 import mmap
 import os
@@ -43,14 +42,7 @@ class Sharer(Client):
     memory = None
 
     def share(self, spin_us=0):
-        number = self.send(share_memory=pb.ShareMemory(spin_us=spin_us))
-        data, rights, _, _ = self.socket.recvmsg(1 << 16, socket.CMSG_SPACE(8 * 4))
-        self.buffer += data
-        answer = self.answer_to(number)
-        self.descriptors = array.array("i")
-        for level, kind, content in rights:
-            if (level, kind) == (socket.SOL_SOCKET, socket.SCM_RIGHTS):
-                self.descriptors.frombytes(content)
+        answer, self.descriptors = self.ask_for_descriptors(share_memory=pb.ShareMemory(spin_us=spin_us))
         if answer.WhichOneof("kind") == "shared_memory":
             self.memory = mmap.mmap(self.descriptors[0], answer.shared_memory.bytes)
             # struct writes byte by byte; the bench may look between two of them.

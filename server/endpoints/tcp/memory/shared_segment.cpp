@@ -5,7 +5,7 @@
 
 #include <array>
 #include <cerrno>
-#include <new>
+#include <memory>
 #include <system_error>
 #include <utility>
 
@@ -14,7 +14,8 @@
 namespace drivebench {
 
 SharedSegment::SharedSegment(std::size_t axes)
-    : memory_(shm::segment_bytes(axes)), segment_(new(memory_.address()) shm::Segment) {
+    : memory_(shm::segment_bytes(axes)),
+      segment_(std::construct_at(static_cast<shm::Segment*>(memory_.address()))) {
   segment_->head.axes = axes;
   std::array<int, 2> bell{};
   if (::socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0, bell.data()) != 0)
