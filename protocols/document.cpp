@@ -169,6 +169,12 @@ void ProblemList::add(const std::string& file, int line, std::string key, std::s
   }
 }
 
+void ProblemList::add(const ProblemList& others) {
+  for (const ConfigProblem& each : others.problems_)
+    add(each.file, each.line, each.key, each.rule);
+  dropped_ += others.dropped_;
+}
+
 void ProblemList::throw_if_any() {
   if (problems_.empty()) return;
   const auto place = [](const ConfigProblem& p) { return std::tie(p.file, p.line, p.key, p.rule); };

@@ -34,13 +34,16 @@ class ConfigError : public std::runtime_error {
 /// Collects problems. Beyond a hundred it only counts them, so that a file of garbage costs no time.
 class ProblemList {
  public:
+  static constexpr std::size_t kMost = 100;
+
   void add(const std::string& file, int line, std::string key, std::string rule);
+  void add(const ProblemList& others);
+  std::size_t count() const noexcept { return problems_.size(); }
   bool full() const noexcept { return problems_.size() >= kMost; }
   /// Throws ConfigError, sorted by file and line, if there are any.
   void throw_if_any();
 
  private:
-  static constexpr std::size_t kMost = 100;
   std::vector<ConfigProblem> problems_;
   std::size_t dropped_ = 0;
 };

@@ -90,9 +90,9 @@ void print_list(const std::vector<Case>& cases) {
 }
 
 std::vector<PreparedCase> prepared_or_refused(const std::vector<Case>& cases,
-                                              const std::filesystem::path& folder) {
+                                              const std::filesystem::path& folder, unsigned jobs) {
   try {
-    return prepare(cases, folder);
+    return prepare(cases, folder, jobs);
   } catch (const ConfigError& error) {
     throw UsageError(error.what());
   }
@@ -188,7 +188,7 @@ void run_missing(Work& work, const TestOptions& options, const StoredResults* st
                  regression::TimingReport& timing) {
   if (work.missing.empty()) return;
   const TemporaryFolder folder;
-  const std::vector<PreparedCase> prepared = prepared_or_refused(work.missing, folder.path());
+  const std::vector<PreparedCase> prepared = prepared_or_refused(work.missing, folder.path(), options.jobs);
   catch_interrupts();
   Progress progress("test");
   const auto see = [&](const CaseResult& result, std::size_t ended) {

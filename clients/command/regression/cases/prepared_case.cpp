@@ -3,11 +3,15 @@
 #include <fmt/core.h>
 
 #include <algorithm>
+#include <atomic>
 #include <charconv>
 #include <cmath>
 #include <cstdlib>
+#include <exception>
 #include <string_view>
 #include <system_error>
+#include <thread>
+#include <utility>
 
 #include "clients/command/common/basics/errors.hpp"
 #include "clients/command/common/programs/composed_file.hpp"
@@ -94,6 +98,73 @@ PreparedCase prepare_one(const Case& c, const fs::path& file, ProblemList& probl
   return prepared_on(c, file, problems);
 }
 
+/// A case that is ready, or what is wrong with it.
+struct Prepared {
+  PreparedCase ready{};
+  ProblemList problems{};
+  std::exception_ptr failure{};
+};
+
+Prepared prepared_or_explained(const Case& c, const fs::path& file) {
+  Prepared prepared{.ready = {.what = &c, .bench_file = file}};
+  if (!c.skip.empty()) return prepared;
+  try {
+    prepared.ready = prepare_one(c, file, prepared.problems);
+  } catch (const ConfigError& error) {
+    for (const ConfigProblem& each : error.problems())
+      prepared.problems.add(each.file, each.line, each.key, each.rule);
+  } catch (const UsageError& error) {
+    report_bench(c, error.what(), file, prepared.problems);
+  }
+  return prepared;
+}
+
+/// Cases that several threads prepare. What is said about them is what one thread would say: they are taken
+/// in their order until more problems are found than are told, and each one that is taken is looked at.
+class Preparation {
+ public:
+  Preparation(const std::vector<Case>& cases, const fs::path& folder)
+      : cases_(cases), folder_(folder), prepared_(cases.size()) {}
+
+  /// Of each thread.
+  void work() {
+    while (!enough_) {
+      const std::size_t n = next_++;
+      if (n >= cases_.size()) return;
+      try {
+        prepared_[n] = prepared_or_explained(cases_[n], folder_ / fmt::format("{}.toml", n));
+      } catch (...) {
+        prepared_[n].failure = std::current_exception();
+      }
+      found_ += prepared_[n].problems.count();
+      if (prepared_[n].failure != nullptr || found_ >= ProblemList::kMost) enough_ = true;
+    }
+  }
+
+  /// Of one thread, when all have ended.
+  std::vector<PreparedCase> take() {
+    ProblemList problems;
+    std::vector<PreparedCase> ready;
+    ready.reserve(prepared_.size());
+    for (Prepared& each : prepared_) {
+      if (each.failure != nullptr) std::rethrow_exception(each.failure);
+      ready.push_back(std::move(each.ready));
+      problems.add(each.problems);
+      if (problems.full()) break;
+    }
+    problems.throw_if_any();
+    return ready;
+  }
+
+ private:
+  const std::vector<Case>& cases_;
+  fs::path folder_;
+  std::vector<Prepared> prepared_;
+  std::atomic<std::size_t> next_ = 0;
+  std::atomic<std::size_t> found_ = 0;
+  std::atomic<bool> enough_ = false;
+};
+
 }  // namespace
 
 std::string misfit(const Case& c, const fs::path& bench) {
@@ -140,25 +211,15 @@ std::string in_lockstep(const fs::path& composed, DeviceUnderTest::Link link) {
   return regression::composed_bench(c, composed);
 }
 
-std::vector<PreparedCase> prepare(const std::vector<Case>& cases, const fs::path& folder) {
-  ProblemList problems;
-  std::vector<PreparedCase> prepared;
-  for (const Case& c : cases) {
-    const fs::path file = folder / fmt::format("{}.toml", prepared.size());
-    prepared.push_back({.what = &c, .bench_file = file});
-    if (!c.skip.empty()) continue;
-    try {
-      prepared.back() = prepare_one(c, file, problems);
-    } catch (const ConfigError& error) {
-      for (const ConfigProblem& each : error.problems())
-        problems.add(each.file, each.line, each.key, each.rule);
-    } catch (const UsageError& error) {
-      report_bench(c, error.what(), file, problems);
-    }
-    if (problems.full()) break;
+std::vector<PreparedCase> prepare(const std::vector<Case>& cases, const fs::path& folder, unsigned jobs) {
+  Preparation preparation(cases, folder);
+  {
+    std::vector<std::jthread> helpers;
+    for (std::size_t n = 1; n < std::min<std::size_t>(jobs, cases.size()); ++n)
+      helpers.emplace_back([&] { preparation.work(); });
+    preparation.work();
   }
-  problems.throw_if_any();
-  return prepared;
+  return preparation.take();
 }
 
 }  // namespace drivebench::command

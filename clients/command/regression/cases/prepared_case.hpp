@@ -36,9 +36,9 @@ std::string misfit(const regression::Case& c, const std::filesystem::path& bench
 /// The text of a composed bench in lockstep, with the delay and the arming that it has in real time.
 std::string in_lockstep(const std::filesystem::path& composed, regression::DeviceUnderTest::Link link);
 
-/// Composes the bench of every case into the folder, and opens it once. Throws ConfigError with everything
-/// that does not fit: nothing has run then. Skipped cases are left as they are.
+/// Composes the bench of every case into the folder, and opens it once, so many at a time. Throws ConfigError
+/// with everything that does not fit: nothing has run then. Skipped cases are left as they are.
 std::vector<PreparedCase> prepare(const std::vector<regression::Case>& cases,
-                                  const std::filesystem::path& folder);
+                                  const std::filesystem::path& folder, unsigned jobs);
 
 }  // namespace drivebench::command

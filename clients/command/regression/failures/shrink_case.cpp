@@ -87,7 +87,7 @@ class Laboratory {
   CaseResult run(const Case& candidate) {
     const fs::path folder = folder_.path() / std::to_string(runs_++);
     fs::create_directory(folder);
-    const std::vector<PreparedCase> prepared = prepare({candidate}, folder);
+    const std::vector<PreparedCase> prepared = prepare({candidate}, folder, 1);
     CaseResult result = run_case(
         {.what = &candidate, .bench_file = prepared.front().bench_file, .facts = prepared.front().facts},
         folder, {});
