@@ -1,7 +1,9 @@
 #include <fmt/core.h>
 
+#include <algorithm>
 #include <array>
 #include <fstream>
+#include <future>
 
 #include "clients/command/common/programs/installation.hpp"
 #include "tests/benchmark/harness/canary.hpp"
@@ -16,7 +18,8 @@ namespace {
 
 constexpr std::size_t kRounds = 5;
 constexpr double kLeastSpeed = 100.0;
-constexpr double kLeastOnTwo = 1.9;
+// Of what the machine gives to two programs side by side: 1.9 times as fast on two whole cores.
+constexpr double kLeastOfTwo = 0.95;
 constexpr double kMostForChecks = 1.25;
 constexpr double kMostOverhead_ms = 5.0;
 constexpr double kMostProgramOverhead_ms = 80.0;
@@ -67,6 +70,14 @@ class SuiteFile {
     std::ofstream(file_) << text;
   }
   double wall_s(int jobs) const { return run_suite({file_.string(), "--jobs", std::to_string(jobs)}).wall_s; }
+  /// Of two programs at the same time, each with all cases and one job.
+  double wall_of_two_s() const {
+    const std::int64_t begin = now_ns();
+    std::future<double> other = std::async(std::launch::async, [this] { return wall_s(1); });
+    wall_s(1);
+    other.get();
+    return 1e-9 * static_cast<double>(now_ns() - begin);
+  }
 
  private:
   ScratchFolder folder_;
@@ -74,7 +85,8 @@ class SuiteFile {
 };
 
 struct Round {
-  double one_s, two_s, one_check_s, short_s, longer_s, program_short_s, program_longer_s;
+  double one_s, two_s, half_s, two_halves_s, one_check_s, short_s, longer_s, program_short_s,
+      program_longer_s;
 };
 
 }  // namespace
@@ -86,6 +98,7 @@ std::vector<Row> measure_suite() {
   const int short_cases = planned(100, 2);
   const int program_cases = planned(10, 1);
   const SuiteFile all_checks(preset_case(long_s, long_cases, kAllChecks));
+  const SuiteFile half(preset_case(long_s, long_cases / 2, kAllChecks));
   const SuiteFile one_check(preset_case(long_s, long_cases, kOneCheck));
   const SuiteFile shorter(preset_case(0.1, short_cases, kOneCheck));
   const SuiteFile longer(preset_case(0.2, short_cases, kOneCheck));
@@ -95,6 +108,8 @@ std::vector<Row> measure_suite() {
   const Rounds<Round> rounds = undisturbed_rounds(cpus, kRounds, [&]() -> Round {
     return {.one_s = all_checks.wall_s(1),
             .two_s = all_checks.wall_s(2),
+            .half_s = half.wall_s(1),
+            .two_halves_s = half.wall_of_two_s(),
             .one_check_s = one_check.wall_s(1),
             .short_s = shorter.wall_s(1),
             .longer_s = longer.wall_s(1),
@@ -102,6 +117,7 @@ std::vector<Row> measure_suite() {
             .program_longer_s = program_longer.wall_s(1)};
   });
   const auto figure = [&rounds](auto of) { return median(rounds.results, of); };
+  const double two_programs = figure([](const Round& r) { return 2.0 * r.half_s / r.two_halves_s; });
   // Twice the short cases less those that last twice as long: what a case costs beside its ticks.
   const auto overhead_ms = [&](double Round::*shortly, double Round::*for_longer, int count) {
     return figure([=](const Round& r) { return 1e3 * (2.0 * (r.*shortly) - r.*for_longer) / count; });
@@ -115,8 +131,9 @@ std::vector<Row> measure_suite() {
           {.name = "suite, two jobs against one",
            .unit = "times as fast",
            .measured = figure([](const Round& r) { return r.one_s / r.two_s; }),
-           .limit = Limit{Limit::Kind::kAtLeast, kLeastOnTwo},
-           .disturbance = rounds.disturbance},
+           .limit = Limit{Limit::Kind::kAtLeast, kLeastOfTwo * std::min(2.0, two_programs)},
+           .disturbance = rounds.disturbance,
+           .note = fmt::format("two programs side by side: {:.2f}", two_programs)},
           {.name = "suite, 12 checks against one",
            .unit = "s",
            .measured = figure(&Round::one_s),
