@@ -58,8 +58,11 @@ class Axis {
   void go_back(const AxisState& state, Tick tick) noexcept;
   /// From now on parts report to this one; null: to none.
   void report_to(GateTap* tap) noexcept { core_.tap = tap; }
-  /// Torque, energy and currents at this instant.
-  GateTruth gate_truth() const noexcept;
+  /// Torque, energy and currents at this instant, which is in this tick.
+  GateTruth gate_truth(Tick tick) const noexcept;
+  /// Parameters or faults have changed within this tick: the drive takes them at once, and a stiff link has
+  /// its new voltage.
+  void take_changes(Tick tick) noexcept;
 
   /// Sensors and truth at the start of `tick`, after the advance that led there: a pure function of state and
   /// tick. The bench's state of commands, leases and late ticks is not in it.

@@ -36,13 +36,19 @@ void Axis::go_back(const AxisState& state, Tick tick) noexcept {
   adjust();
 }
 
-GateTruth Axis::gate_truth() const noexcept {
+void Axis::take_changes(Tick tick) noexcept {
+  const AxisState state = state_;
+  go_back(state, tick);
+  core_.drive.take_stiff_link(state_.drive);
+}
+
+GateTruth Axis::gate_truth(Tick tick) const noexcept {
   const RotorMotion motion{
       .angle_rad = state_.shaft.angle_rad, .speed_rad_s = state_.shaft.speed_rad_s, .electrical = {1.0, 0.0}};
   const MachineTruth truth = train_->truth(state_, motion);
   return {.current_a = phases_of(terminal_currents(core_.connection, truth.current_a, state_.open_terminals)),
           .torque_nm = truth.torque_nm,
-          .load_nm = load_at(core_.tick),
+          .load_nm = load_at(tick),
           .magnetic_j = train_->stored_energy_j(state_, motion),
           .hall_lines =
               hall_lines(core_.p.sensors.hall, state_.injected, core_.pole_pairs * state_.shaft.angle_rad)};

@@ -31,6 +31,9 @@ void copy_but_standing(const AxisState& from, AxisState& to) noexcept {
   copy(sensors.data() + sensors.size(), begin + sizeof(AxisState));
 }
 
+/// next_edge() and what base_ is behind now by [pieces].
+constexpr std::size_t kMostBehind = 16;
+
 double pole_pairs_of_machine(const AxisParameters& p) {
   return std::visit([](const auto& machine) { return pole_pairs_of(machine); }, p.machine);
 }
@@ -79,6 +82,12 @@ void GateAxis::keep(Moment& moment) const {
   copy_but_standing(axis_.state(), moment.axis);
 }
 
+void GateAxis::begin_here() {
+  keep(base_);
+  ahead_ = 0;
+  catch_up_at_ = LegTimer::kNever;
+}
+
 void GateAxis::go_back(const AxisState& state) {
   if (clock_.tick_open != 0) {
     axis_.go_back(state, tick());
@@ -105,12 +114,15 @@ void GateAxis::extend(Picoseconds limit) {
     to = std::min(to, clock_.legs[k].next(from));
   }
   tap_.events.clear();
-  if (!diverged() && axis_.run_part(levels, within_tick_s(from), within_tick_s(to))) log_events(from);
-  const Picoseconds tick_end = (tick() + 1) * period_;
+  const bool is_held = clock_.diverged_from != LegTimer::kNever;
+  if (!is_held && axis_.run_part(levels, within_tick_s(from), within_tick_s(to))) log_events(from);
+  const bool ends_tick = to == (tick() + 1) * period_;
   clock_.at = to;
-  if (to != tick_end) return;
-  if (!diverged()) axis_.close_tick();
-  clock_.tick_open = 0;
+  if (ends_tick) {
+    if (!is_held && (axis_.state().faults & kDiverged) == 0) axis_.close_tick();
+    clock_.tick_open = 0;
+  }
+  if (!is_held && (axis_.state().faults & kDiverged) != 0) clock_.diverged_from = from;
 }
 
 void GateAxis::log_events(Picoseconds from) {
@@ -205,7 +217,38 @@ void GateAxis::stop_here() {
   passed_ = 0;
   told_count_ = log_.size();
   if (clock_.at != now_) run_to_now();
-  keep(base_);
+  begin_here();
+}
+
+void GateAxis::catch_up() {
+  if (passed_ < told_count_) return;
+  Moment ahead = base_;
+  keep(ahead);
+  const Picoseconds begun = base_.clock.at;
+  const std::size_t known = log_.size();
+  std::size_t over = told_count_;
+  Picoseconds pieces = 0;
+  go_back(base_);
+  while (true) {
+    extend(LegTimer::kNever);
+    const std::size_t here = log_.size() - known;
+    log_.resize(known);
+    if (clock_.at > now_ || over + here > passed_) break;
+    over += here;
+    ++pieces;
+    keep(base_);
+  }
+  go_back(ahead);
+  if (pieces == 0) return;
+  log_.erase(log_.begin(), log_.begin() + static_cast<std::ptrdiff_t>(over));
+  passed_ -= over;
+  told_count_ = 0;
+  told_.hall_count = base_.clock.hall_count;
+  for (std::size_t n = 0; n < passed_; ++n) {
+    if (log_[n].edge.kind == EventKind::kHall) told_.hall_count = log_[n].hall_count;
+  }
+  const Picoseconds usual = (base_.clock.at - begun) / pieces;
+  catch_up_at_ = base_.clock.at + static_cast<Picoseconds>(kMostBehind) * std::max<Picoseconds>(usual, 1);
 }
 
 void GateAxis::set_leg(std::size_t leg, const LegSetting& setting) {
@@ -224,49 +267,56 @@ void GateAxis::set_load(double load_nm) {
 void GateAxis::set_parameters(const AxisParameters& p) {
   stop_here();
   axis_.set_parameters(with_terminals(p));
-  go_back(AxisState(axis_.state()));  // the tick that is running takes them
+  if (clock_.tick_open != 0) axis_.take_changes(tick());
   keep(base_);
 }
 
 void GateAxis::inject(std::size_t row, double value) {
   stop_here();
   axis_.inject(row, value);
-  go_back(AxisState(axis_.state()));  // the drive takes its faults
+  if (clock_.tick_open != 0) axis_.take_changes(tick());
   keep(base_);
 }
 
 void GateAxis::clear_faults() {
   stop_here();
   axis_.clear_faults();
+  clock_.diverged_from = LegTimer::kNever;
   keep(base_);
 }
 
 std::size_t GateAxis::run(Picoseconds until, std::span<GateEdge> edges) {
+  const auto end_at = [this](Picoseconds at) {
+    now_ = at;
+    if (now_ >= catch_up_at_) catch_up();
+  };
   std::size_t written = 0;
   while (true) {
     while (passed_ < log_.size() && log_[passed_].edge.at <= until) {
-      const Logged& event = log_[passed_++];
+      const Logged event = log_[passed_++];
       if (passed_ > told_count_) tell(event);
       if (edges.empty()) continue;
       edges[written++] = event.edge;
       if (written < edges.size()) continue;
-      now_ = event.edge.at;
+      end_at(event.edge.at);
       return written;
     }
     if (clock_.at >= until) break;
     log_.clear();
     passed_ = told_count_ = 0;
     told_.hall_count = clock_.hall_count;
-    keep(base_);
+    begin_here();
     extend(LegTimer::kNever);
   }
-  now_ = until;
+  end_at(until);
   return written;
 }
 
 std::optional<GateEdge> GateAxis::next_edge(Picoseconds limit) {
-  while (passed_ == log_.size() && clock_.at < limit)
+  while (passed_ == log_.size() && clock_.at < limit) {
     extend(LegTimer::kNever);
+    if (++ahead_ == kMostBehind) catch_up_at_ = std::min(catch_up_at_, clock_.at);
+  }
   if (passed_ == log_.size() || log_[passed_].edge.at > limit) return std::nullopt;
   return log_[passed_].edge;
 }
@@ -285,39 +335,7 @@ GateAxis::Now GateAxis::seen() const {
   LegLevels levels{};
   for (std::size_t k = 0; k < levels.size(); ++k)
     levels[k] = clock_.legs[k].level();
-  return {.state = axis_.state(), .truth = axis_.gate_truth(), .sums = tap_.sums, .levels = levels};
-}
-
-std::vector<std::byte> GateAxis::save() const {
-  static_assert(std::is_trivially_copyable_v<Saved> && std::is_trivially_copyable_v<Logged>);
-  const Saved saved{
-      .base = base_, .now = now_, .told = told_, .cut = cut_, .passed = passed_, .told_count = told_count_};
-  std::vector<std::byte> bytes(sizeof(Saved) + told_count_ * sizeof(Logged));
-  std::memcpy(bytes.data(), &saved, sizeof(Saved));
-  std::memcpy(bytes.data() + sizeof(Saved), log_.data(), told_count_ * sizeof(Logged));
-  return bytes;
-}
-
-bool GateAxis::restore(std::span<const std::byte> bytes) {
-  constexpr std::size_t kMostPieces = 100'000;  // that next_edge() had to look at
-  Saved saved;
-  if (bytes.size() < sizeof(Saved)) return false;
-  std::memcpy(&saved, bytes.data(), sizeof(Saved));
-  if (bytes.size() - sizeof(Saved) != saved.told_count * sizeof(Logged)) return false;
-  base_ = saved.base;
-  now_ = saved.now;
-  told_ = saved.told;
-  cut_ = saved.cut;
-  told_count_ = saved.told_count;
-  passed_ = saved.passed;
-  log_.resize(told_count_);
-  std::memcpy(log_.data(), bytes.data() + sizeof(Saved), told_count_ * sizeof(Logged));
-  go_back(base_);
-  for (std::size_t n = 0; clock_.at < now_ || log_.size() < passed_; ++n) {
-    if (n == kMostPieces) return false;
-    extend(LegTimer::kNever);
-  }
-  return true;
+  return {.state = axis_.state(), .truth = axis_.gate_truth(tick()), .sums = tap_.sums, .levels = levels};
 }
 
 }  // namespace drivebench

@@ -48,7 +48,7 @@ class GateAxis {
   void set_load(double load_nm);
   /// From now on. The parameters must be free of problems() and differ in live ones only.
   void set_parameters(const AxisParameters& p);
-  /// From the next tick on.
+  /// From now on; a fault of the gate driver from the next tick on.
   void inject(std::size_t row, double value);
   void clear_faults();
 
@@ -58,11 +58,13 @@ class GateAxis {
   std::size_t run(Picoseconds until, std::span<GateEdge> edges);
   /// The same if nothing is due up to there; else it does nothing and is false.
   bool run_idle(Picoseconds until) noexcept {
-    const bool due = clock_.at < until || (passed_ < log_.size() && log_[passed_].edge.at <= until);
+    const bool due = clock_.at < until || catch_up_at_ <= until ||
+                     (passed_ < log_.size() && log_[passed_].edge.at <= until);
     if (!due) now_ = until;
     return !due;
   }
-  /// The first event up to `limit` if no leg is set before; changes nothing.
+  /// The first event up to `limit` if no leg is set before; changes nothing. Asked again it goes on from
+  /// where it has looked to.
   std::optional<GateEdge> next_edge(Picoseconds limit);
 
   /// At this instant, before what is set at it acts.
@@ -73,21 +75,24 @@ class GateAxis {
     LegLevels levels;
   };
   Now look();
-  bool diverged() const noexcept { return (axis_.state().faults & kDiverged) != 0; }
+  /// Whether it has before now, however far next_edge() has looked.
+  bool diverged() const noexcept { return clock_.diverged_from < now_; }
   /// Events that a piece had beyond the room for them.
   std::uint64_t lost_events() const noexcept { return tap_.events.lost(); }
 
-  /// The whole state but the parameters. restore() takes only bytes of save() of an axis of the same
-  /// parameters; false for others.
-  std::vector<std::byte> save() const;
-  bool restore(std::span<const std::byte> bytes);
+  /// The whole state but the parameters.
+  std::vector<std::byte> save();
+  /// Takes bytes of save() of an axis of the same parameters; is_possible_state judges the state of the axis
+  /// in them. False for bytes that no save() has made: this axis is then of no use any more.
+  bool restore(std::span<const std::byte> bytes, bool (*is_possible_state)(const AxisState&) noexcept);
 
  private:
   /// What goes on with time beside the axis. 8-byte members only.
   struct Clock {
     Picoseconds at = 0;
-    std::int64_t tick_open = 0;   ///< 1: within a tick
-    std::int64_t hall_count = 0;  ///< sectors of 60 electrical degrees
+    std::int64_t tick_open = 0;                    ///< 1: within a tick
+    std::int64_t hall_count = 0;                   ///< sectors of 60 electrical degrees
+    Picoseconds diverged_from = LegTimer::kNever;  ///< the start of the piece in which the machine has
     std::array<LegTimer, 3> legs{};
   };
   /// All that goes on with time.
@@ -125,6 +130,8 @@ class GateAxis {
 
   /// Where the axis is, into a moment of this axis: each piece does so, and a whole copy has 6 kB.
   void keep(Moment& moment) const;
+  /// Begins at the present moment: the next piece is the first one that is looked at.
+  void begin_here();
   void go_back(const Moment& moment);
   void go_back(const AxisState& state);
   /// Runs one piece, which ends at `limit` at the latest.
@@ -142,6 +149,13 @@ class GateAxis {
   }
   /// From base to now; what happens on the way is known.
   void run_to_now();
+  /// Lets base follow to the last end of a piece up to now, where a client only looks ahead and runs: else
+  /// the log and what look() integrates again would grow for ever.
+  void catch_up();
+  bool is_possible(const Saved& saved) const noexcept;
+  bool is_possible(const Logged& event) const noexcept;
+  /// Whether the count is that of the angle, a thousand turns of the field aside.
+  bool is_possible_hall_count(std::int64_t count, const AxisState& state) const noexcept;
   Now seen() const;
   /// Lets a piece end now.
   void stop_here();
@@ -160,9 +174,11 @@ class GateAxis {
   Clock clock_{};  ///< where the axis is: at the end of a piece, not before now_
   Moment base_{};  ///< where that piece, or the first one that next_edge() has looked at, began
   Picoseconds now_ = 0;
-  std::vector<Logged> log_{};   ///< what happens from base_ on
-  std::size_t passed_ = 0;      ///< of them, which have been handed out
-  std::size_t told_count_ = 0;  ///< of them, which told_ has already
+  std::vector<Logged> log_{};                   ///< what happens from base_ on
+  std::size_t passed_ = 0;                      ///< of them, which have been handed out
+  std::size_t told_count_ = 0;                  ///< of them, which told_ has already
+  std::size_t ahead_ = 0;                       ///< pieces that next_edge() has looked at since base_
+  Picoseconds catch_up_at_ = LegTimer::kNever;  ///< so many that base_ has to follow
   Told told_{};
   Cut cut_{};
 };

@@ -86,7 +86,7 @@ void Drive::begin_tick(DriveMemory& m, const PhaseCommand& command, const Inject
   }
   supply_v_ = supply_voltage_v(p_.bus, p_.amplifier.voltage_limit_v, connection_) * (1.0 - faults.bus_sag);
   const bool stiff = p_.bus.capacitance_f == 0.0;
-  if (stiff) m.bus_v = supply_v_;
+  take_stiff_link(m);
   m.commands[static_cast<std::size_t>(tick) % m.commands.size()] =
       faults.command_corruption > 0.0 ? corrupted(command, faults.command_corruption, tick) : command;
   take_orders(m, faults, tick);
@@ -98,6 +98,10 @@ void Drive::begin_tick(DriveMemory& m, const PhaseCommand& command, const Inject
     steady_output_ = bridge_output(m, 0.0, period_s_, {});
     steady_ = true;
   }
+}
+
+void Drive::take_stiff_link(DriveMemory& m) const noexcept {
+  if (kind_ != DriveKind::kSource && p_.bus.capacitance_f == 0.0) m.bus_v = supply_v_;
 }
 
 void Drive::switch_off(DriveMemory& m) noexcept {

@@ -97,6 +97,9 @@ class Drive {
   void begin_tick(DriveMemory& m, const PhaseCommand& command, const InjectedFaults& faults,
                   Tick tick) noexcept;
 
+  /// A link without a capacitor has the voltage of its supply, as the last begin_tick() knew it.
+  void take_stiff_link(DriveMemory& m) const noexcept;
+
   /// Switches the gates off (a source: opens the contactor) for the rest of the tick: over-current trip. Call
   /// it after each begin_tick() while the trip lasts: delayed commands and contactors do not depend on it.
   void switch_off(DriveMemory& m) noexcept;

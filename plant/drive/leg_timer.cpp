@@ -11,6 +11,17 @@ constexpr std::size_t switch_of(LegLevel level) noexcept {
 
 }  // namespace
 
+bool is_possible(const LegSetting& s) noexcept {
+  const auto within = [](Picoseconds x, Picoseconds least, Picoseconds most) noexcept {
+    return x >= least && x <= most;
+  };
+  if (s.mode > LegMode::kPwmLow || s.centred > 1 || !within(s.dead, 0, LegSetting::kLongestDead))
+    return false;
+  if (s.mode < LegMode::kPwm) return true;
+  return within(s.period, LegSetting::kShortestPeriod, LegSetting::kLongestPeriod) &&
+         within(s.compare, 0, s.period) && within(s.period_start, 0, kLastPicosecond);
+}
+
 Picoseconds LegTimer::phase(Picoseconds now) const noexcept {
   const Picoseconds rest = (now - setting_.period_start) % setting_.period;
   return rest < 0 ? rest + setting_.period : rest;
@@ -36,6 +47,15 @@ void LegTimer::go_to(Picoseconds now) noexcept {
     closes_ = to == LegLevel::kOff ? now : std::max(now, opened_[1 - switch_of(to)] + setting_.dead);
   }
   if (closes_ <= now) level_ = wanted_;
+}
+
+bool LegTimer::is_possible(Picoseconds now) const noexcept {
+  const auto is_level = [](LegLevel level) noexcept {
+    return level == LegLevel::kOff || level == LegLevel::kLow || level == LegLevel::kHigh;
+  };
+  const auto has_been = [now](Picoseconds at) noexcept { return at >= kLongAgo && at <= now; };
+  return drivebench::is_possible(setting_) && is_level(wanted_) && is_level(level_) && has_been(opened_[0]) &&
+         has_been(opened_[1]) && closes_ >= kLongAgo && closes_ <= now + LegSetting::kLongestDead;
 }
 
 Picoseconds LegTimer::next(Picoseconds now) const noexcept {

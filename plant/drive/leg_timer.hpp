@@ -11,6 +11,9 @@ namespace drivebench {
 /// Time at gate level since tick 0 [ps]: 63 bits are 106 days.
 using Picoseconds = std::int64_t;
 
+/// The last instant at gate level.
+inline constexpr Picoseconds kLastPicosecond = 9'000'000'000'000'000'000;
+
 /// What a leg does; the numbers are those of drivebench_leg_mode.
 enum class LegMode : std::uint32_t {
   kOpen = 0,     ///< both switches open
@@ -23,6 +26,10 @@ enum class LegMode : std::uint32_t {
 
 /// The settings of a leg's timer. The grid of periods reaches in both directions from period_start.
 struct LegSetting {
+  static constexpr Picoseconds kShortestPeriod = 100'000;
+  static constexpr Picoseconds kLongestPeriod = 1'000'000'000'000;
+  static constexpr Picoseconds kLongestDead = 1'000'000'000;
+
   LegMode mode = LegMode::kOpen;
   std::uint32_t centred = 0;  ///< 1: on in the middle of the period; 0: from its start on
   Picoseconds period_start = 0;
@@ -32,6 +39,9 @@ struct LegSetting {
 
   bool operator==(const LegSetting&) const noexcept = default;
 };
+
+/// Whether a timer can have this setting: its numbers are within their limits.
+bool is_possible(const LegSetting& setting) noexcept;
 
 /// A leg played by its timer: 8-byte members only.
 class LegTimer {
@@ -51,8 +61,12 @@ class LegTimer {
   LegLevel level() const noexcept { return level_; }
   /// The instant after `now` of the next change; kNever if there is none.
   Picoseconds next(Picoseconds now) const noexcept;
+  /// Whether a timer can have come to this at `now`: for one from bytes.
+  bool is_possible(Picoseconds now) const noexcept;
 
  private:
+  static constexpr Picoseconds kLongAgo = -(Picoseconds{1} << 62);
+
   LegLevel wanted(Picoseconds now) const noexcept;
   bool switches() const noexcept {
     return setting_.mode >= LegMode::kPwm && setting_.compare > 0 && setting_.compare < setting_.period;
@@ -67,8 +81,8 @@ class LegTimer {
   LegSetting setting_{};
   LegLevel wanted_ = LegLevel::kOff;
   LegLevel level_ = LegLevel::kOff;
-  Picoseconds closes_ = 0;                                         ///< what is wanted
-  std::array<Picoseconds, 2> opened_{-(1LL << 62), -(1LL << 62)};  ///< lower and upper switch, last
+  Picoseconds closes_ = 0;                                 ///< what is wanted
+  std::array<Picoseconds, 2> opened_{kLongAgo, kLongAgo};  ///< lower and upper switch, last
 };
 
 }  // namespace drivebench

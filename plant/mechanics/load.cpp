@@ -13,6 +13,7 @@ void LoadTorque::go_to(double target_nm, Tick tick, Tick ramp_ticks) noexcept {
 
 double LoadTorque::at(Tick tick) const noexcept {
   const Tick elapsed = tick - start_tick_;
+  if (elapsed < 0) return start_nm_;
   if (elapsed >= ramp_ticks_) return target_nm_;
   return start_nm_ +
          (target_nm_ - start_nm_) * (static_cast<double>(elapsed) / static_cast<double>(ramp_ticks_));

@@ -9,7 +9,7 @@ class LoadTorque {
  public:
   /// Goes from the present value to target_nm in ramp_ticks (0: a step at this tick).
   void go_to(double target_nm, Tick tick, Tick ramp_ticks) noexcept;
-  /// The torque that holds during this tick.
+  /// The torque that holds during this tick, which may lie before the last change.
   double at(Tick tick) const noexcept;
   /// Whether both torques are within +-largest_nm, and the ticks from 0 to `latest`: for a load from bytes.
   bool is_within(double largest_nm, Tick latest) const noexcept;

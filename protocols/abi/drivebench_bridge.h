@@ -20,8 +20,9 @@
  *
  * SI units and signs as in drivebench.h, times in picoseconds since the bridge was opened. Every call that
  * can fail returns 0 (DRIVEBENCH_OK) or a code; drivebench_bridge_error() has the sentence, and after a
- * refusal nothing has changed. A bridge belongs to one thread at a time. drivebench_bridge_set(), _run(),
- * _next_edge() and _read() allocate nothing; in process they make no system call, and with shared memory none
+ * refusal nothing has changed, but that time goes on where _run() says DRIVEBENCH_LATCHED of a machine that
+ * has diverged. A bridge belongs to one thread at a time. drivebench_bridge_set(), _run(), _next_edge() and
+ * _read() allocate nothing; in process they make no system call, and with shared memory none
  * while both sides are awake.
  */
 #ifndef DRIVEBENCH_BRIDGE_H
@@ -84,7 +85,8 @@ typedef struct drivebench_bridge_state {
   uint64_t comparator_levels; /**< 1 a, 2 b, 4 c: above the reference */
   uint64_t hall_lines;        /**< 1 line 1, 2 line 2, 4 line 3 */
   int64_t encoder_count;
-  uint64_t legs;       /**< two bits for each leg, a the lowest: 0 open, 1 low, 2 high; dead time is open */
+  uint64_t legs;       /**< what the timers ask for, two bits for each leg, a the lowest: 0 open, 1 low,
+                          2 high; dead time is open. A break, a trip or a fault opens legs behind it. */
   uint64_t faults;     /**< fault word, as in drivebench_sample */
   uint64_t lost_edges; /**< edges of one step that were more than 512 */
 } drivebench_bridge_state;
@@ -152,7 +154,9 @@ DRIVEBENCH_API int drivebench_bridge_get_parameter(drivebench_bridge* bridge, co
                                                    double* value);
 /** Writes one that is live, from now on: a resistance, a friction, the supply. Saved with the state. */
 DRIVEBENCH_API int drivebench_bridge_set_parameter(drivebench_bridge* bridge, const char* name, double value);
-/** Puts a fault in force, as drivebench_inject() does, from now on; 0 takes it away. */
+/** Puts a fault in force, as drivebench_inject() does, from now on; 0 takes it away. A fault of the gate
+ * driver acts from the next tick of the bench file on; one of a Hall line changes the line without an edge.
+ */
 DRIVEBENCH_API int drivebench_bridge_inject(drivebench_bridge* bridge, const char* name, double value);
 /** Clears latched faults; the legs close again with the next tick of the bench file. */
 DRIVEBENCH_API int drivebench_bridge_clear(drivebench_bridge* bridge);

@@ -12,14 +12,15 @@
 #include "plant/math/trig.hpp"
 #include "plant/parameters/parameters.hpp"
 #include "server/bench/change_requests.hpp"
+#include "server/bench/state_limits.hpp"
 
 namespace drivebench {
 namespace {
 
-constexpr std::uint64_t kMagic = 0x3265'6764'7262'6264u;  // "dbbrdge2"
-constexpr std::uint64_t kShortestPeriodPs = 100'000;
-constexpr std::uint64_t kLongestPeriodPs = 1'000'000'000'000;
-constexpr std::uint64_t kLongestDeadPs = 1'000'000'000;
+constexpr std::uint64_t kMagic = 0x3365'6764'7262'6264u;  // "dbbrdge3"
+constexpr std::uint64_t kShortestPeriodPs = LegSetting::kShortestPeriod;
+constexpr std::uint64_t kLongestPeriodPs = LegSetting::kLongestPeriod;
+constexpr std::uint64_t kLongestDeadPs = LegSetting::kLongestDead;
 
 std::uint64_t digest_of(std::span<const std::byte> bytes, std::uint64_t hash) noexcept {
   for (const std::byte byte : bytes)
@@ -110,9 +111,17 @@ InprocBridge::Problem InprocBridge::problem_with(const BenchConfig& config, std:
 }
 
 InprocBridge::InprocBridge(const BenchConfig& config, std::uint32_t axis)
-    : axis_(config.setup.axes[axis].parameters, config.setup.period_ns, config.setup.substeps,
-            config.setup.seed, axis),
-      configuration_(configuration_hash(config) + axis) {}
+    : parameters_(config.setup.axes[axis].parameters),
+      period_ns_(config.setup.period_ns),
+      substeps_(config.setup.substeps),
+      seed_(config.setup.seed),
+      index_(axis),
+      configuration_(configuration_hash(config) + axis),
+      axis_(new_axis()) {}
+
+std::unique_ptr<GateAxis> InprocBridge::new_axis() const {
+  return std::make_unique<GateAxis>(parameters_, period_ns_, substeps_, seed_, index_);
+}
 
 int InprocBridge::refuse_time(const char* name, std::uint64_t at_ps) noexcept {
   if (at_ps < now_ps()) {
@@ -130,19 +139,19 @@ int InprocBridge::refuse_diverged() noexcept {
 }
 
 int InprocBridge::set(std::uint32_t leg, const drivebench_leg& s) noexcept {
-  if (leg >= static_cast<std::uint32_t>(axis_.legs())) {
+  if (leg >= static_cast<std::uint32_t>(axis_->legs())) {
     return fail(DRIVEBENCH_OUT_OF_RANGE, "leg is " + std::to_string(leg) + " but the machine has legs 0 to " +
-                                             std::to_string(axis_.legs() - 1));
+                                             std::to_string(axis_->legs() - 1));
   }
   std::string problem = problem_in_leg(s);
   if (!problem.empty()) return fail(DRIVEBENCH_OUT_OF_RANGE, "leg " + std::to_string(leg) + ": " + problem);
   const bool pwm = s.mode >= DRIVEBENCH_LEG_PWM;
-  axis_.set_leg(leg, {.mode = static_cast<LegMode>(s.mode),
-                      .centred = pwm ? s.centred : 0,
-                      .period_start = pwm ? static_cast<Picoseconds>(s.period_start_ps) : 0,
-                      .period = pwm ? static_cast<Picoseconds>(s.period_ps) : 0,
-                      .compare = pwm ? static_cast<Picoseconds>(s.compare_ps) : 0,
-                      .dead = static_cast<Picoseconds>(s.dead_ps)});
+  axis_->set_leg(leg, {.mode = static_cast<LegMode>(s.mode),
+                       .centred = pwm ? s.centred : 0,
+                       .period_start = pwm ? static_cast<Picoseconds>(s.period_start_ps) : 0,
+                       .period = pwm ? static_cast<Picoseconds>(s.period_ps) : 0,
+                       .compare = pwm ? static_cast<Picoseconds>(s.compare_ps) : 0,
+                       .dead = static_cast<Picoseconds>(s.dead_ps)});
   return DRIVEBENCH_OK;
 }
 
@@ -151,9 +160,9 @@ int InprocBridge::run(std::uint64_t until_ps, std::span<drivebench_bridge_edge> 
   count = 0;
   if (const int code = check_time("until_ps", until_ps); code != DRIVEBENCH_OK) return code;
   const auto until = static_cast<Picoseconds>(until_ps);
-  if (axis_.run_idle(until)) return check_finite();
+  if (axis_->run_idle(until)) return check_finite();
   if (edges.empty()) {
-    axis_.run(until, {});
+    axis_->run(until, {});
   } else {
     run_with(edges, until, count);
   }
@@ -165,7 +174,7 @@ void InprocBridge::run_with(std::span<drivebench_bridge_edge> edges, Picoseconds
   std::array<GateEdge, 16> some;
   while (count < edges.size()) {
     const std::span<GateEdge> room = std::span(some).first(std::min(some.size(), edges.size() - count));
-    const std::size_t written = axis_.run(until, room);
+    const std::size_t written = axis_->run(until, room);
     for (std::size_t n = 0; n < written; ++n)
       edges[count++] = edge_of(room[n]);
     if (written < room.size()) break;
@@ -175,14 +184,14 @@ void InprocBridge::run_with(std::span<drivebench_bridge_edge> edges, Picoseconds
 int InprocBridge::next_edge(std::uint64_t limit_ps, drivebench_bridge_edge& edge, bool& found) noexcept {
   found = false;
   if (const int code = check_time("limit_ps", limit_ps); code != DRIVEBENCH_OK) return code;
-  const std::optional<GateEdge> next = axis_.next_edge(static_cast<Picoseconds>(limit_ps));
+  const std::optional<GateEdge> next = axis_->next_edge(static_cast<Picoseconds>(limit_ps));
   found = next.has_value();
   if (found) edge = edge_of(*next);
   return DRIVEBENCH_OK;
 }
 
 int InprocBridge::read(drivebench_bridge_state& s) noexcept {
-  const GateAxis::Now now = axis_.look();
+  const GateAxis::Now now = axis_->look();
   s = {.now_ps = now_ps(),
        .current_a = {},
        .terminal_v = {},
@@ -198,7 +207,7 @@ int InprocBridge::read(drivebench_bridge_state& s) noexcept {
        .encoder_count = now.state.encoder.count,
        .legs = 0,
        .faults = now.state.faults,
-       .lost_edges = axis_.lost_events()};
+       .lost_edges = axis_->lost_events()};
   put(s.current_a, now.truth.current_a);
   put(s.terminal_v, now.state.terminal_v);
   put(s.comparator_v, now.state.comparators.filtered_v);
@@ -211,8 +220,8 @@ int InprocBridge::read(drivebench_bridge_state& s) noexcept {
 }
 
 InprocBridge::Mark InprocBridge::mark_of_now() noexcept {
-  const GateAxis::Now now = axis_.look();
-  return {.at = axis_.now(), .angle_rad = turned_rad(now.state), .sums = now.sums};
+  const GateAxis::Now now = axis_->look();
+  return {.at = axis_->now(), .angle_rad = turned_rad(now.state), .sums = now.sums};
 }
 
 int InprocBridge::mark() noexcept {
@@ -249,19 +258,19 @@ int InprocBridge::set_load(double load_nm) noexcept {
   if (const auto* refused = std::get_if<RefusedRequest>(&judged)) {
     return fail(static_cast<int>(refused->code), refused->sentence);
   }
-  axis_.set_load(load_nm);
+  axis_->set_load(load_nm);
   return DRIVEBENCH_OK;
 }
 
 int InprocBridge::get_parameter(const char* name, double& value) noexcept {
-  const Parameter* const row = find_parameter(axis_.parameters(), name);
-  if (row == nullptr) return fail(DRIVEBENCH_UNKNOWN_PARAMETER, unknown_parameter(axis_.parameters(), name));
-  value = row->get(axis_.parameters());
+  const Parameter* const row = find_parameter(axis_->parameters(), name);
+  if (row == nullptr) return fail(DRIVEBENCH_UNKNOWN_PARAMETER, unknown_parameter(axis_->parameters(), name));
+  value = row->get(axis_->parameters());
   return DRIVEBENCH_OK;
 }
 
 int InprocBridge::set_parameter(const char* name, double value) noexcept {
-  const ChangeView view{.parameters = axis_.parameters(),
+  const ChangeView view{.parameters = axis_->parameters(),
                         .shaft_of = {},
                         .amplifier_of = {},
                         .drives_another = false,
@@ -270,33 +279,32 @@ int InprocBridge::set_parameter(const char* name, double value) noexcept {
   if (const auto* refused = std::get_if<RefusedRequest>(&judged)) {
     return fail(static_cast<int>(refused->code), refused->sentence);
   }
-  AxisParameters changed = axis_.parameters();
+  AxisParameters changed = axis_->parameters();
   find_parameter(changed, name)->set(changed, value);
-  axis_.set_parameters(changed);
+  axis_->set_parameters(changed);
   return DRIVEBENCH_OK;
 }
 
 std::vector<double> InprocBridge::live_values() const {
   std::vector<double> values;
-  for (const Parameter& row : axis_parameters(axis_.parameters())) {
-    if (row.live) values.push_back(row.get(axis_.parameters()));
+  for (const Parameter& row : axis_parameters(axis_->parameters())) {
+    if (row.live) values.push_back(row.get(axis_->parameters()));
   }
   return values;
 }
 
-bool InprocBridge::take_live_values(std::span<const double> values) {
-  AxisParameters wanted = axis_.parameters();
+std::optional<AxisParameters> InprocBridge::with_live_values(std::span<const double> values) const {
+  AxisParameters wanted = parameters_;
   std::size_t next = 0;
   for (const Parameter& row : axis_parameters(wanted)) {
     if (!row.live) continue;
     const double value = values[next++];
     if (value == row.get(wanted)) continue;
-    if (breaks_a_rule(row, value)) return false;
+    if (breaks_a_rule(row, value)) return std::nullopt;
     row.set(wanted, value);
   }
-  if (breaks_a_rule(wanted)) return false;
-  axis_.set_parameters(wanted);
-  return true;
+  if (breaks_a_rule(wanted)) return std::nullopt;
+  return wanted;
 }
 
 int InprocBridge::inject(const char* name, double value) noexcept {
@@ -304,19 +312,19 @@ int InprocBridge::inject(const char* name, double value) noexcept {
   if (const auto* refused = std::get_if<RefusedRequest>(&judged)) {
     return fail(static_cast<int>(refused->code), refused->sentence);
   }
-  axis_.inject(find_injectable_fault(name), value);
+  axis_->inject(find_injectable_fault(name), value);
   return DRIVEBENCH_OK;
 }
 
 int InprocBridge::clear() noexcept {
-  axis_.clear_faults();
+  axis_->clear_faults();
   return DRIVEBENCH_OK;
 }
 
 int InprocBridge::save(std::vector<std::byte>& state) noexcept {
   const std::vector<double> values = live_values();
   const auto parameters = std::as_bytes(std::span(values));
-  const std::vector<std::byte> axis = axis_.save();
+  const std::vector<std::byte> axis = axis_->save();
   Header header{.magic = kMagic, .configuration = configuration_, .digest = 0, .mark = mark_};
   const auto head = std::as_bytes(std::span(&header, 1));
   state.resize(head.size());
@@ -338,17 +346,17 @@ int InprocBridge::restore(std::span<const std::byte> state) noexcept {
   if (header.configuration != configuration_) return refuse("is of another bench file or axis");
   const std::span<const std::byte> rest = state.subspan(sizeof(Header));
   if (header.digest != digest_of(header.mark, rest)) return refuse("is damaged: its digest does not fit");
-  std::vector<double> values(live_count(axis_.parameters()));
+  std::vector<double> values(live_count(axis_->parameters()));
   const auto parameters = std::as_writable_bytes(std::span(values));
   if (rest.size() < parameters.size()) return refuse("is of another build");
   std::ranges::copy(rest.first(parameters.size()), parameters.begin());
-  const std::vector<double> values_before = live_values();
-  const std::vector<std::byte> before = axis_.save();
-  if (!take_live_values(values) || !axis_.restore(rest.subspan(parameters.size()))) {
-    take_live_values(values_before);
-    axis_.restore(before);
-    return refuse("is of another build");
-  }
+  const std::optional<AxisParameters> wanted = with_live_values(values);
+  if (!wanted) return refuse("is of another build");
+  std::unique_ptr<GateAxis> restored = new_axis();
+  restored->set_parameters(*wanted);
+  const auto judge = [](const AxisState& axis) noexcept { return is_possible(axis); };
+  if (!restored->restore(rest.subspan(parameters.size()), judge)) return refuse("is of another build");
+  axis_ = std::move(restored);
   mark_ = header.mark;
   return DRIVEBENCH_OK;
 }

@@ -2,7 +2,10 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <memory>
+#include <optional>
 #include <span>
+#include <string>
 #include <vector>
 
 #include "plant/gate_axis.hpp"
@@ -12,7 +15,7 @@
 namespace drivebench {
 
 /// The last instant to which a bridge goes.
-inline constexpr std::uint64_t kLastBridgePs = 9'000'000'000'000'000'000u;
+inline constexpr std::uint64_t kLastBridgePs = kLastPicosecond;
 
 /// An axis of a bench at gate level, behind the C ABI.
 class InprocBridge final : public abi::Bridge {
@@ -30,7 +33,7 @@ class InprocBridge final : public abi::Bridge {
   int set(std::uint32_t leg, const drivebench_leg& setting) noexcept override;
   int run(std::uint64_t until_ps, std::span<drivebench_bridge_edge> edges,
           std::size_t& count) noexcept override;
-  std::uint64_t now_ps() const noexcept override { return static_cast<std::uint64_t>(axis_.now()); }
+  std::uint64_t now_ps() const noexcept override { return static_cast<std::uint64_t>(axis_->now()); }
   int next_edge(std::uint64_t limit_ps, drivebench_bridge_edge& edge, bool& found) noexcept override;
   int read(drivebench_bridge_state& state) noexcept override;
   int mark() noexcept override;
@@ -64,18 +67,25 @@ class InprocBridge final : public abi::Bridge {
     return at_ps >= now_ps() && at_ps <= kLastBridgePs ? DRIVEBENCH_OK : refuse_time(name, at_ps);
   }
   int refuse_time(const char* name, std::uint64_t at_ps) noexcept;
-  int check_finite() noexcept { return axis_.diverged() ? refuse_diverged() : DRIVEBENCH_OK; }
+  int check_finite() noexcept { return axis_->diverged() ? refuse_diverged() : DRIVEBENCH_OK; }
   int refuse_diverged() noexcept;
   /// Runs to `until` or until the room for edges is full; `count` of them are written.
   [[gnu::noinline]] void run_with(std::span<drivebench_bridge_edge> edges, Picoseconds until,
                                   std::size_t& count) noexcept;
   Mark mark_of_now() noexcept;
+  /// The axis at tick 0, all legs open.
+  std::unique_ptr<GateAxis> new_axis() const;
   std::vector<double> live_values() const;
-  /// Whether the values are possible ones; else nothing has changed.
-  bool take_live_values(std::span<const double> values);
+  /// Those of the bench file with these live ones; nothing: they are not possible.
+  std::optional<AxisParameters> with_live_values(std::span<const double> values) const;
 
-  GateAxis axis_;
+  AxisParameters parameters_;  ///< of the bench file
+  std::int64_t period_ns_;
+  int substeps_;
+  std::uint64_t seed_;
+  std::uint32_t index_;
   std::uint64_t configuration_;
+  std::unique_ptr<GateAxis> axis_;
   Mark mark_{};
 };
 

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "plant/drive/phases.hpp"
+#include "plant/injected_faults.hpp"
 #include "tests/plant/bridge_rig.hpp"
 
 namespace drivebench {
@@ -67,6 +68,8 @@ struct Course {
     }
   }
 };
+
+constexpr auto kAnyState = [](const AxisState&) noexcept { return true; };
 
 constexpr Picoseconds kStep = 1'234'567'891;  // on no grid
 constexpr int kSteps = 30;
@@ -254,7 +257,7 @@ TEST(GateAxis, ASavedStateGoesOnToTheBit) {
   first.axis.next_edge(11 * kStep);
   const std::vector<std::byte> saved = first.axis.save();
   Course second(turning_motor());
-  ASSERT_TRUE(second.axis.restore(saved));
+  ASSERT_TRUE(second.axis.restore(saved, kAnyState));
   first.edges.clear();
   for (Course* course : {&first, &second}) {
     course->run(11 * kStep, 64);
@@ -266,7 +269,7 @@ TEST(GateAxis, ASavedStateGoesOnToTheBit) {
   for (std::size_t n = 0; n < first.edges.size(); ++n)
     EXPECT_TRUE(same(first.edges[n], second.edges[n]));
   EXPECT_EQ(first.axis.look().state.machine, second.axis.look().state.machine);
-  EXPECT_FALSE(second.axis.restore(std::span(saved).first(saved.size() - 8)));
+  EXPECT_FALSE(second.axis.restore(std::span(saved).first(saved.size() - 8), kAnyState));
 }
 
 // Catches: a current zero that is not told, told late, or that a phase which is open brings again.
@@ -284,6 +287,32 @@ TEST(GateAxis, ACurrentThatDiesIsTold) {
   const double expected_s = kTime_s * std::log1p(2.0 * kResistance_ohm * from_a / kLink_v);
   EXPECT_EQ(edges[0].kind, EventKind::kCurrentZero);
   EXPECT_NEAR(1e-12 * static_cast<double>(edges[0].at - 100 * kMicro), expected_s, 2e-12);  // a rounded time
+}
+
+// Catches: a load of the tick that has ended, or the ramp of one that has not begun.
+TEST(GateAxis, ALoadIsReadFromTheInstantOfItsSetting) {
+  GateAxis axis(turning_motor(), kPeriodNs, 4, 1, 0);
+  axis.run(1000 * kPeriodNs * 7, {});
+  axis.set_load(0.01);
+  EXPECT_EQ(axis.look().truth.load_nm, 0.01);
+  axis.set_load(0.01);
+  EXPECT_EQ(axis.look().truth.load_nm, 0.01);
+  axis.run(1000 * kPeriodNs * 7 + 12'345, {});
+  EXPECT_EQ(axis.look().truth.load_nm, 0.01);
+}
+
+// Catches: a stiff link whose voltage waits for the next tick.
+TEST(GateAxis, AStiffLinkHasItsNewVoltageAtOnce) {
+  AxisParameters p = standing_motor();
+  GateAxis axis(p, kPeriodNs, 4, 1, 0);
+  axis.run(100 * kMicro + 7 * kMicro, {});
+  p.drive.bus.voltage_v = 0.5 * kLink_v;
+  axis.set_parameters(p);
+  axis.run(axis.now() + 1000, {});
+  EXPECT_EQ(axis.look().state.drive.bus_v, 0.5 * kLink_v);
+  axis.inject(find_injectable_fault("bus_sag"), 0.5);
+  axis.run(axis.now() + 1000, {});
+  EXPECT_EQ(axis.look().state.drive.bus_v, 0.25 * kLink_v);
 }
 
 }  // namespace

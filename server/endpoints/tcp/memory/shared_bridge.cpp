@@ -16,10 +16,9 @@ namespace drivebench {
 namespace {
 
 constexpr std::uint64_t kPsInMs = 1'000'000'000;
-/// A run is carried out in parts, between which the thread looks whether the session has ended: its result
-/// does not depend on them.
+/// A run or a look ahead is carried out in parts, between which the thread looks whether the session has
+/// ended: its result does not depend on them.
 constexpr std::uint64_t kPartPs = kPsInMs;
-/// A look ahead is made in one piece.
 constexpr std::uint64_t kFarthestLookPs = 1000 * kPsInMs;
 /// A session that has ended is noticed so soon where nothing wakes the thread.
 constexpr std::chrono::milliseconds kLook{100};
@@ -152,10 +151,15 @@ int SharedBridge::next_edge(std::uint64_t limit_ps) noexcept {
                                                      "ahead at most, to " +
                                                      std::to_string(now_ps + kFarthestLookPs));
   }
-  bool is_there = false;
-  const int code = bridge_.next_edge(limit_ps, segment_.reply.edges.front(), is_there);
-  segment_.reply.count = is_there ? 1 : 0;
-  return code;
+  // In parts, too: each goes on from where the last one has looked to.
+  for (std::uint64_t to_ps = now_ps;;) {
+    const bool is_last = limit_ps < to_ps || limit_ps - to_ps <= kPartPs;
+    to_ps = is_last ? limit_ps : to_ps + kPartPs;
+    bool is_there = false;
+    const int code = bridge_.next_edge(to_ps, segment_.reply.edges.front(), is_there);
+    segment_.reply.count = is_there ? 1 : 0;
+    if (code != DRIVEBENCH_OK || is_last || is_there || ends_.load()) return code;
+  }
 }
 
 int SharedBridge::save() noexcept {

@@ -96,12 +96,13 @@ bool SharedExchanges::serve() {
 void SharedExchanges::exchange(std::uint32_t number) {
   const shm::Request& request = segment_->request();
   const std::uint64_t count = request.count;
+  std::atomic_signal_fence(std::memory_order_seq_cst);  // read once: the client might change it meanwhile
   if (count > shm::kMaxAxes) {
     return refuse(number, v1::REFUSAL_OUT_OF_RANGE,
                   std::to_string(count) + " commands, but there are at most " + std::to_string(shm::kMaxAxes),
                   "commands");
   }
-  // A copy: the client might change them meanwhile.
+  // A copy: the client might change these, too.
   commands_.assign(request.commands.begin(), request.commands.begin() + static_cast<std::ptrdiff_t>(count));
   std::atomic_signal_fence(std::memory_order_seq_cst);
   exchanges_.exchange(commands_, *this, number);
