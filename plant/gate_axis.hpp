@@ -154,7 +154,7 @@ class GateAxis {
   void catch_up();
   bool is_possible(const Saved& saved) const noexcept;
   bool is_possible(const Logged& event) const noexcept;
-  /// Whether the count is that of the angle, a thousand turns of the field aside.
+  /// Whether the count is that of the angle, a thousand turns aside, or nobody asks for it.
   bool is_possible_hall_count(std::int64_t count, const AxisState& state) const noexcept;
   Now seen() const;
   /// Lets a piece end now.

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstring>
 #include <optional>
 #include <string>
@@ -43,6 +44,14 @@ drivebench_bridge_edge edge_of(const GateEdge& edge) noexcept {
           .channel = edge.channel,
           .level = edge.level,
           .reserved = 0};
+}
+
+/// Whether a bridge can have come to it. Within a tick the angle goes on beyond a turn.
+bool is_possible_within_tick(const AxisState& axis) noexcept {
+  constexpr double kLargestRad = 1e9;
+  AxisState wrapped = axis;
+  if (std::abs(axis.shaft.angle_rad) <= kLargestRad) wrapped.shaft.angle_rad = 0.0;
+  return is_possible(wrapped);
 }
 
 /// Writes three values.
@@ -354,8 +363,8 @@ int InprocBridge::restore(std::span<const std::byte> state) noexcept {
   if (!wanted) return refuse("is of another build");
   std::unique_ptr<GateAxis> restored = new_axis();
   restored->set_parameters(*wanted);
-  const auto judge = [](const AxisState& axis) noexcept { return is_possible(axis); };
-  if (!restored->restore(rest.subspan(parameters.size()), judge)) return refuse("is of another build");
+  if (!restored->restore(rest.subspan(parameters.size()), is_possible_within_tick))
+    return refuse("holds what no bridge can come to");
   axis_ = std::move(restored);
   mark_ = header.mark;
   return DRIVEBENCH_OK;

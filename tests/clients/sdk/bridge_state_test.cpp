@@ -130,6 +130,26 @@ TEST(BridgeState, LookingAheadForALongTimeLeavesNothingBehind) {
   EXPECT_EQ(looks.save(), runs.save());
 }
 
+// The rotor turns at some thousand rad/s, and between two ticks its angle goes beyond a turn. Catches: a
+// state within a tick that is refused, or that does not go on with the same bits.
+TEST(BridgeState, EveryStateOfATurnCanBeRestored) {
+  Bridge bridge;
+  Bridge other;
+  ASSERT_EQ(drivebench_bridge_set_load(bridge.handle, -2.0), DRIVEBENCH_OK);
+  for (std::uint64_t now_ps = 0; now_ps < 30 * kMilli; now_ps += 7'300'001) {
+    ASSERT_EQ(bridge.run(now_ps), DRIVEBENCH_OK);
+    const std::vector<std::byte> state = bridge.save();
+    ASSERT_EQ(drivebench_bridge_restore(other.handle, state.data(), state.size()), DRIVEBENCH_OK)
+        << now_ps << ": " << other.error();
+    ASSERT_EQ(other.save(), state) << now_ps;
+  }
+  ASSERT_EQ(bridge.run(1500 * kMilli), DRIVEBENCH_OK);
+  EXPECT_GT(bridge.read().angle_rad, 7000.0);
+  const std::vector<std::byte> state = bridge.save();
+  EXPECT_EQ(drivebench_bridge_restore(other.handle, state.data(), state.size()), DRIVEBENCH_OK)
+      << other.error();
+}
+
 // A load of 20,000 N m turns the small rotor beyond all bounds within 10 ms. Catches: a look ahead
 // after which a run says what has not happened yet, a machine that diverges in silence.
 TEST(BridgeState, AMachineDivergesWhenItDoesAndNotWhenItIsLookedAt) {

@@ -26,7 +26,7 @@ MICRO, SECOND = 10**6, 10**12
 REQUEST, ARGUMENTS = 64, struct.Struct("=QQQdIIQQQQ128s")
 REPLY = (REQUEST + 16 + ARGUMENTS.size + 63) // 64 * 64
 LIBC, FUTEX = ctypes.CDLL(None), {"x86_64": 202, "aarch64": 98}[platform.machine()]
-RUN, READ, NEXT_EDGE, SAVE, RESTORE, INJECT = 2, 4, 3, 12, 13, 10
+SET, RUN, READ, NEXT_EDGE, SAVE, RESTORE, INJECT = 1, 2, 4, 3, 12, 13, 10
 
 
 class Raw(Client):
@@ -138,13 +138,17 @@ class SharedBridge(WireTest):
         self.assertEqual(self.client(server).newest().tick, 0)
 
     def test_a_run_without_end_keeps_nobody_waiting_and_ends_with_its_session(self):
-        """Catches: a run that stalls the bench's own sessions, a bridge that outlives its session, one place fewer for each that was
-        left."""
+        """Catches: a run or a look ahead that stalls the bench's own sessions, a bridge that outlives its session, one place fewer
+        for each that was left."""
         server = self.gates()
         for _ in range(3):
             clients = [self.raw(server) for _ in range(4)]
-            for client in clients:
+            for client in clients[:2]:
                 client.post(RUN, number=8_000_000 * SECOND)
+            for client in clients[2:]:
+                for leg in range(3):  # no line current: nothing is to be seen, in 40 million steps
+                    self.assertEqual(client.call(SET, number=leg, leg=(3, 0, 0, MICRO // 10, MICRO // 20, 1000))[0], 0)
+                client.post(NEXT_EDGE, number=SECOND)
             over = Raw(server.raw(unix=True), True)
             self.addCleanup(over.close)
             self.assertRefused(over.share(), pb.REFUSAL_BUSY, "kind")
@@ -152,7 +156,7 @@ class SharedBridge(WireTest):
             for _ in range(20):
                 stepper.status()
             for client in clients:
-                self.assertNotEqual(client.replied.value, client.number, "the run is still under way")
+                self.assertNotEqual(client.replied.value, client.number, "the run or look is still under way")
                 client.close()
             over.close()
 
@@ -165,6 +169,7 @@ class SharedBridge(WireTest):
 
             until(has_room, "the place of a bridge whose session has ended")
         self.assertEqual(server.stop(), 0)
+
 
 if __name__ == "__main__":
     unittest.main(verbosity=2)
