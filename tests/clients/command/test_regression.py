@@ -248,12 +248,12 @@ override.axis.servo.machine.rotor_resistance_ohm = [3.9, 5.85]
     def test_many_mistakes_are_told_the_same_for_any_number_of_jobs(self):
         """Catches: cases that threads look at and leave out, an end that depends on which thread came first."""
         for n in range(60):
-            steps = "".join(f'[[step]]\nat_s = 0.1\nfault = "open_{n}_{k}"\nvalue = 1\n' for k in range(1 + n % 4))
+            steps = "".join(f'[[step]]\nat_s = 0.1\nfault = "open_{n}_{k}"\nvalue = 1\n' for k in range(1 + n % 3))
             self.write(f"{n:02}.toml", SERVO + steps)
         told = [self.run_test(self.folder / "suite", "--jobs", jobs, code=USAGE).stderr for jobs in (1, 2, 8, 8, 8)]
         self.assertEqual(told, told[:1] * 5)
         self.assertIn("open_0_0", told[0])
-        self.assertGreater(len(told[0].splitlines()), 100)
+        self.assertIn("and 2 more problems", told[0])
 
     def test_filters_tags_and_lists_choose_cases(self):
         """Catches: a filter that runs everything, a suite without cases that passes."""

@@ -80,7 +80,7 @@ class SharedBridge(WireTest):
     def raw(self, server):
         client = Raw(server.raw(unix=True), True)
         self.addCleanup(client.close)
-        client.share()
+        until(lambda: client.share().WhichOneof("kind") == "shared_memory", "a place for a bridge")
         return client
 
     def test_what_has_no_gate_level_is_refused(self):
@@ -159,15 +159,8 @@ class SharedBridge(WireTest):
                 self.assertNotEqual(client.replied.value, client.number, "the run or look is still under way")
                 client.close()
             over.close()
-
-            def has_room():
-                client = Raw(server.raw(unix=True), True)
-                try:
-                    return client.share().WhichOneof("kind") == "shared_memory"
-                finally:
-                    client.close()
-
-            until(has_room, "the place of a bridge whose session has ended")
+        for _ in range(4):
+            self.raw(server)
         self.assertEqual(server.stop(), 0)
 
 
