@@ -31,6 +31,11 @@ struct SensorErrors {
   std::array<double, 2> eccentricity_rad{};  ///< by sine and cosine of the measured angle of the shaft
 
   bool operator==(const SensorErrors&) const = default;
+  /// Whether a motor on the measured voltages runs alike under both.
+  bool drives_as(const SensorErrors& other) const noexcept {
+    return voltage_gain == other.voltage_gain && voltage_offset_v == other.voltage_offset_v &&
+           voltage_delay_s == other.voltage_delay_s && angle_offset_rad == other.angle_offset_rad;
+  }
 };
 
 /// A motor and its sensors after a move along one coordinate.
@@ -39,6 +44,7 @@ struct Moved {
   Model model;
   SensorErrors errors;
   bool sensors;  ///< whether the errors have moved
+  bool drives;   ///< whether the slopes have moved
 };
 
 /// A motor on the voltages of a record, from sample to sample, its own shaft turning its frame, and what a
@@ -77,6 +83,8 @@ class Flow {
     errors_ = errors;
     measured_.clear();
     voltages_.clear();
+    measured_.reserve(samples() * at(outputs_));
+    voltages_.reserve(samples() * at(2 * substeps_ + 1));
     for (std::size_t k = r_.range.first; k < r_.range.end; ++k) {
       for (std::size_t phase = 0; phase < r_.currents.size(); ++phase)
         measured_.push_back(current_at(phase, k, errors));

@@ -12,7 +12,6 @@ using Matrix = Eigen::MatrixXd;
 using Vector = Eigen::VectorXd;
 
 constexpr double kUnknownDeviation = 100.0;
-constexpr int kMostGaussNewtonSteps = 15;
 constexpr double kNearStep2 = 100.0;  // of a step in its own standard deviations: derivatives may stand
 constexpr Eigen::Index kParts = 64;
 
@@ -75,7 +74,7 @@ Fit gauss_newton(const Residuals& residuals, const Vector& start, const Steps& s
   Vector tried;
   double size2 = 0.0;
   bool near = false;
-  for (int step = 0; step < kMostGaussNewtonSteps; ++step) {
+  for (int step = 0; step < steps.most && !fit.ended; ++step) {
     if (!near && !linearise(residuals, fit.at, l)) return fit;
     const Vector gradient = l.jacobian.transpose() * l.residual;
     bool better = false;
@@ -101,8 +100,10 @@ Fit gauss_newton(const Residuals& residuals, const Vector& start, const Steps& s
       damping = better ? 0.1 * damping : std::max(10.0 * damping, 1e-3);
       if (damping < 1e-4) damping = 0.0;
     }
-    if (!better || size2 < small2) break;
+    fit.ended = !better || size2 < small2;
   }
+  fit.found = true;
+  if (!steps.covariance) return fit;
   fit.covariance = covariance_of(l);
   fit.residual = l.residual;
   fit.jacobian = std::move(l.jacobian);

@@ -20,6 +20,7 @@ struct Fit {
   Eigen::MatrixXd jacobian;    ///< of the residuals, at most a hundredth of a standard deviation from there,
                                ///< or what Steps::near allows
   bool found = false;
+  bool ended = false;  ///< within the most steps
 };
 
 /// How a search moves.
@@ -28,6 +29,8 @@ struct Steps {
   double near = 0.0;    ///< the derivatives stand after a step of less in every coordinate, and of less than
                         ///< ten standard deviations
   double small = 0.01;  ///< a step of so many standard deviations is the last
+  int most = 15;        ///< steps
+  bool covariance = true;  ///< whether the fit has one; another fit that begins from it needs none
 };
 
 /// Gauss-Newton with damping after Levenberg and Marquardt. A direction that the residuals do not show stays

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstddef>
 #include <limits>
+#include <memory>
 #include <span>
 #include <vector>
 
@@ -13,6 +14,12 @@
 #include "plant/math/trig.hpp"
 
 namespace drivebench::identification {
+
+/// Minus twice the logarithm of a likelihood, less a constant, as it grows with the samples.
+struct Course {
+  double end = std::numeric_limits<double>::infinity();  ///< of all samples
+  std::vector<double> laps{};                            ///< after every so many samples
+};
 
 /// A motor that is predicted from sample to sample: the model runs on the measured voltages, its own shaft
 /// turns its frame, and after each sample a part of the difference between measured and predicted signals
@@ -28,30 +35,50 @@ class Predictor : public Flow<Model> {
   using typename Base::Outputs, typename Base::Square, typename Base::State, typename Base::Values,
       typename Base::Vector;
 
-  Predictor(const PredictorRecord& record, const Model& model) : Base(record, model) {
-    samples_.resize(Base::samples());
-    corrections_.resize(samples_.size());
-  }
+  Predictor(const PredictorRecord& record, const Model& model)
+      : Base(record, model),
+        samples_(std::make_unique_for_overwrite<Sample[]>(Base::samples())),
+        corrections_(std::make_unique_for_overwrite<Correction[]>(Base::samples())) {}
 
-  std::size_t rows() const noexcept { return samples_.size() * at(outputs_); }
+  static constexpr std::size_t kUsualSamples = 4000;  ///< tell two noises of most motors well enough
+
+  std::size_t rows() const noexcept { return Base::samples() * at(outputs_); }
 
   /// Linearises the model along its filtered run with these noises.
-  void linearise(const Model& model, const SensorNoise& noise) { run<true>(model, noise); }
+  void linearise(const Model& model, const SensorNoise& noise) { run<true>(model, noise, kToTheEnd); }
   /// Works out the gains for these noises about the last linearisation.
-  void filter(const Model& model, const SensorNoise& noise) { run<false>(model, noise); }
+  void filter(const Model& model, const SensorNoise& noise) { run<false>(model, noise, kToTheEnd); }
   /// Minus twice the logarithm of the likelihood of the first samples, less a constant; infinite if the run
   /// leaves all bounds. The gains are then those for these noises in these samples alone.
   double unlikelihood(const Model& model, const SensorNoise& noise) {
-    constexpr std::size_t kSamples = 4000;  // tell two noises well enough
-    return run<false>(model, noise, kSamples);
+    return course(model, noise, kUsualSamples, {}).end;
+  }
+  /// The course of unlikelihood() over so many samples. If they are more than the usual ones and it falls
+  /// behind that of a leader by 20 in the logarithm of the likelihood, it stops, and its end is infinite.
+  Course course(const Model& model, const SensorNoise& noise, std::size_t samples, const Course& leader) {
+    constexpr std::size_t kLap = 256;
+    constexpr double kBehind = 40.0;
+    Course own;
+    own.end = run<false>(
+        model, noise,
+        [&](std::size_t n, double sum) {
+          if (n % kLap != 0) return true;
+          const std::size_t lap = own.laps.size();
+          own.laps.push_back(sum);
+          return samples <= kUsualSamples || lap >= leader.laps.size() || !(sum > leader.laps[lap] + kBehind);
+        },
+        samples);
+    return own;
   }
 
   /// The innovations of a motor with the gains of the last filter(), over their expected rms, sample by
-  /// sample; false if the run leaves all bounds. It may be of another type with the same state.
-  bool innovations(const auto& model, Eigen::VectorXd& out) const {
+  /// sample, then so many rows for the caller; false if the run leaves all bounds. It may be of another type
+  /// with the same state.
+  bool innovations(const auto& model, Eigen::VectorXd& out, Eigen::Index more_rows = 0) const {
     State x = first_state(model, errors_);
-    out.resize(static_cast<Eigen::Index>(rows()));
-    for (std::size_t n = 0; n < samples_.size(); ++n) {
+    out.resize(static_cast<Eigen::Index>(rows()) + more_rows);
+    out.tail(more_rows).setZero();
+    for (std::size_t n = 0; n < Base::samples(); ++n) {
       const Direction direction = direction_at(x);
       const Values found = corrected_by_gains(n, errors_at(n, outputs(model, x, direction)), x);
       for (std::size_t j = 0; j < at(outputs_); ++j)
@@ -65,18 +92,19 @@ class Predictor : public Flow<Model> {
   /// The derivatives of innovations() by the coordinates that moved the motors by `difference`, a column for
   /// each, from the variational equations along the run of `model`; false if that leaves all bounds.
   bool derivatives(const Model& model, std::span<const Moved<Model>> moved, double difference,
-                   Eigen::MatrixXd& out) const {
+                   Eigen::MatrixXd& out, Eigen::Index more_rows = 0) const {
     State x = first_state(model, errors_);
     const std::size_t count = moved.size();
     Columns shift(kStates, index(count));
     for (std::size_t k = 0; k < count; ++k)
       shift.col(index(k)) =
           (vector_of(first_state(moved[k].model, moved[k].errors)) - vector_of(x)) / difference;
-    out.resize(static_cast<Eigen::Index>(rows()), shift.cols());
+    out.resize(static_cast<Eigen::Index>(rows()) + more_rows, shift.cols());
+    out.bottomRows(more_rows).setZero();
     Eigen::Matrix<double, kMostOutputs, Eigen::Dynamic> errors(kMostOutputs, shift.cols());
-    Columns slopes(kStates, shift.cols());
+    Columns slopes = Columns::Zero(kStates, shift.cols());
     Columns carried(kStates, shift.cols());
-    for (std::size_t n = 0; n < samples_.size(); ++n) {
+    for (std::size_t n = 0; n < Base::samples(); ++n) {
       const Direction direction = direction_at(x);
       const Values values = outputs(model, x, direction);
       errors.noalias() = -shown_at(model, x, values, direction).lazyProduct(shift);
@@ -86,8 +114,9 @@ class Predictor : public Flow<Model> {
       correct_shifts(n, errors, shift, out);
       corrected_by_gains(n, errors_at(n, values), x);
       x = followed(model, x, n, direction, [&](const Tangent& tangent) {
-        for (std::size_t k = 0; k < count; ++k)
-          slopes.col(index(k)) = moved_slope(tangent, moved[k], n) / difference;
+        for (std::size_t k = 0; k < count; ++k) {
+          if (moved[k].drives) slopes.col(index(k)) = moved_slope(tangent, moved[k], n) / difference;
+        }
         carried.noalias() = tangent.transition.lazyProduct(shift);
         carried.noalias() += tangent.growth.lazyProduct(slopes);
         shift.swap(carried);
@@ -145,7 +174,10 @@ class Predictor : public Flow<Model> {
       for (int i = 0; i < j; ++i)
         errors.row(j) -= c.coupling(j, i) * errors.row(i);
       shift.noalias() += c.gain.col(j).lazyProduct(errors.row(j));
-      out.row(index(n) * outputs_ + j) = c.weight[at(j)] * errors.row(j);
+    }
+    for (Eigen::Index k = 0; k < shift.cols(); ++k) {
+      for (int j = 0; j < outputs_; ++j)
+        out(index(n) * outputs_ + j, k) = c.weight[at(j)] * errors(j, k);
     }
   }
 
@@ -213,15 +245,20 @@ class Predictor : public Flow<Model> {
     return noise;
   }
 
+  static constexpr auto kToTheEnd = [](std::size_t, double) { return true; };
+
+  /// `goes_on` is asked at each sample, with the sum before it; a run that does not ends with infinity.
   template <bool linearising>
-  double run(const Model& model, const SensorNoise& noise,
+  double run(const Model& model, const SensorNoise& noise, const auto& goes_on,
              std::size_t most = std::numeric_limits<std::size_t>::max()) {
     State x = first_state(model, errors_);
     Square p = first_spread(model, noise);
     const double voltage2 = noise.voltage_v * noise.voltage_v;
     double sum = 0.0;
     filtered_.clear();
-    for (std::size_t n = 0; n < std::min(most, samples_.size()); ++n) {
+    filtered_.reserve(Base::samples());
+    for (std::size_t n = 0; n < std::min(most, Base::samples()); ++n) {
+      if (!goes_on(n, sum)) return std::numeric_limits<double>::infinity();
       const Direction direction = direction_at(x);
       Sample& s = samples_[n];
       const Values values = outputs(model, x, direction);
@@ -242,8 +279,8 @@ class Predictor : public Flow<Model> {
     return std::isfinite(sum) ? sum : std::numeric_limits<double>::infinity();
   }
 
-  std::vector<Sample> samples_;
-  std::vector<Correction> corrections_;
+  std::unique_ptr<Sample[]> samples_;  ///< filled by linearise(), as many as there are samples
+  std::unique_ptr<Correction[]> corrections_;
   std::vector<State> filtered_;
 };
 

@@ -11,6 +11,8 @@ struct SensorNoise {
   double voltage_v = 0.0;
   double current_a = 0.0;
   double angle_rad = 0.0;
+
+  bool operator==(const SensorNoise&) const = default;
 };
 
 /// What the predictor needs of a record.

@@ -106,7 +106,7 @@ std::vector<BendingInductionModel> bending_motors(Series flux_wb, const BendingI
 /// What the fit of an induction motor says of its iron.
 struct Iron {
   std::optional<BendTest> bend{};  ///< of a straight motor; nothing if one with a bend leaves all bounds
-  double largest_wb = 0.0;         ///< of the magnetising flux, once the filter knows it; 0: there is no fit
+  double largest_wb = 0.0;         ///< of the magnetising flux, once the filter knows it
 };
 
 constexpr std::ptrdiff_t kUnsettled = 16;  ///< a part of the record: until the filter knows the flux
@@ -166,13 +166,15 @@ std::optional<Suspicion> suspicion_of(const Predictor<Model>& predictor, const F
   std::vector<Moved<Model>> moved;
   moved.reserve(suspects.size());
   for (const Suspect& suspect : suspects)
-    moved.push_back({.model = model, .errors = suspect.errors, .sensors = true});
+    moved.push_back({.model = model,
+                     .errors = suspect.errors,
+                     .sensors = true,
+                     .drives = !suspect.errors.drives_as(errors_of(trial))});
   Eigen::MatrixXd directions;
-  if (!predictor.derivatives(model, moved, 1.0, directions)) return {};
-  const Eigen::Index rows = directions.rows();
-  directions.conservativeResize(fit.residual.size(), Eigen::NoChange);  // with those that no sensor moves
-  directions.bottomRows(fit.residual.size() - rows).setZero();
-  return strongest_suspicion(fit, unknowns, suspects, directions);
+  // No sensor moves the rows beyond those of the predictor.
+  const Eigen::Index more_rows = fit.residual.size() - static_cast<Eigen::Index>(predictor.rows());
+  if (!predictor.derivatives(model, moved, 1.0, directions, more_rows)) return {};
+  return strongest_suspicion(fit, unknowns, suspects, std::move(directions));
 }
 
 /// Why this motor does not explain the record; empty if it does.
@@ -216,77 +218,134 @@ Excitation refusal(const Result& result, const Doubt& doubt) {
   return verdict_against(result, doubt.reason);
 }
 
+/// A motor that was fitted to a record.
 template <class Model>
-Iron refine_with(const PredictorRecord& record, const Settings& e, Result& result, const Result* near) {
+struct Fitted {
+  std::vector<Unknown> unknowns{};
+  Result trial{};  ///< the values of the fit
+  Predictor<Model> predictor;
+  SensorNoise noise{};
+  Fit fit{};
+};
+
+/// Where a fit begins: from a motor near by and its noises, or from those of the equations.
+struct Begin {
+  const Result* near = nullptr;
+  std::optional<SensorNoise> noise{};
+  Rounds rounds = kRounds;
+};
+
+Begin begin_near(const Result* near, const PredictorRecord& record, const Settings& e) {
+  if (near == nullptr) return {};
+  return {.near = near,
+          .noise = SensorNoise{.voltage_v = near->explanation->voltage_noise_v,
+                               .current_a = near->explanation->current_noise_a,
+                               .angle_rad = first_noise(record, e).angle_rad},
+          .rounds = kNearRounds};
+}
+
+/// Adds the errors of the sensors to `result` and fits it, with the predictor of another fit if there is one.
+template <class Model>
+Fitted<Model> fitted(const PredictorRecord& record, const Settings& e, Result& result, const Begin& begin,
+                     std::optional<Predictor<Model>> predictor = {}) {
   const double duration_s = record.period_s * static_cast<double>(record.range.count());
   std::vector<Unknown> unknowns = unknowns_of(e, result, record.largest_speed, duration_s);
   add_sensors(e, record, result, unknowns);
-  Result trial = near == nullptr ? result : begun(result, *near);
-  Predictor<Model> predictor(record, Model(trial, e));
+  Result trial = begin.near == nullptr ? result : begun(result, *begin.near);
   SensorNoise noise = first_noise(record, e);
   noise.current_a = std::max(noise.current_a, kFirstCurrent * record.largest_current_a);
-  if (near != nullptr) {
-    noise.voltage_v = near->explanation->voltage_noise_v;
-    noise.current_a = near->explanation->current_noise_a;
-  }
-  const Fit fit = fit_in_rounds(record, e, predictor, unknowns, trial, noise, near != nullptr);
-  Iron iron;
-  if (!fit.found) {
-    set_apart(e, unknowns, false, result);
-    result.excitation = verdict_against(result, "no motor near that of the equations follows it");
-    return iron;
-  }
-  put_fit(e, unknowns, fit, result);
-  result.explanation = explanation_of(predictor, fit, noise, record, e);
+  if (!predictor) predictor.emplace(record, Model(trial, e));
+  Fitted<Model> f{.unknowns = std::move(unknowns),
+                  .trial = std::move(trial),
+                  .predictor = *std::move(predictor),
+                  .noise = begin.noise.value_or(noise)};
+  f.fit = fit_in_rounds(record, e, f.predictor, f.unknowns, f.trial, f.noise, begin.rounds);
+  return f;
+}
+
+void refuse_unfitted(const Settings& e, const std::vector<Unknown>& unknowns, Result& result) {
+  set_apart(e, unknowns, false, result);
+  result.excitation = verdict_against(result, "no motor near that of the equations follows it");
+}
+
+/// Estimates, noises and verdict of a fit.
+template <class Model>
+void judge(const PredictorRecord& record, const Settings& e, Fitted<Model>& f, const Iron& iron,
+           Result& result) {
+  put_fit(e, f.unknowns, f.fit, result);
+  result.explanation = explanation_of(f.predictor, f.fit, f.noise, record, e);
   Series speeds;
-  for (const auto& x : predictor.filtered())
+  for (const auto& x : f.predictor.filtered())
     speeds.push_back(x[Model::kSpeed]);
-  if constexpr (std::is_same_v<Model, InductionModel>)
-    iron = straight_of(predictor, fit, unknowns, BendingInductionModel(trial, e));
-  if constexpr (std::is_same_v<Model, SaturatedInductionModel>)
-    iron.largest_wb = largest_flux_wb(predictor.filtered(), record);
-  const Doubt doubt = doubt_of(result, record, iron,
-                               [&] { return suspicion_of(predictor, fit, unknowns, trial, record, e); });
-  result.explanation->unlikelihood = predictor.unlikelihood(Model(trial, e), noise);
+  const Doubt doubt = doubt_of(
+      result, record, iron, [&] { return suspicion_of(f.predictor, f.fit, f.unknowns, f.trial, record, e); });
+  result.explanation->unlikelihood = f.predictor.unlikelihood(Model(f.trial, e), f.noise);
   result.explanation->holds = !doubt.any();
-  set_apart(e, unknowns, result.explanation->holds, result);
+  set_apart(e, f.unknowns, result.explanation->holds, result);
   if (doubt.any()) {
     result.excitation = refusal(result, doubt);
-    return iron;
+    return;
   }
   const double torque_nm = accelerating_torque(speeds, record.period_s, result.at("J"));
   result.excitation = verdict_on(e.kind, unseen_parameters(result, torque_nm, rms(speeds)));
   if (iron.bend && result.excitation.sufficient) result.notes.push_back(straight_note(*iron.bend));
-  return iron;
 }
 
-/// A motor with a magnetising curve near a straight one. The straight fit does not know the largest flux of
-/// the record, which its curve must reach: points that miss it are placed anew, from the first curve on.
-Result saturated_near(const PredictorRecord& record, const Settings& e, const Result& straight,
-                      double largest_wb) {
+template <class Model>
+void refine_with(const PredictorRecord& record, const Settings& e, Result& result, const Result* near) {
+  Fitted<Model> f = fitted<Model>(record, e, result, begin_near(near, record, e));
+  if (f.fit.found)
+    judge(record, e, f, {}, result);
+  else
+    refuse_unfitted(e, f.unknowns, result);
+}
+
+/// The motor with a magnetising curve near a straight one that explains the record, if there is one. The
+/// straight fit does not know the largest flux of the record, which the curve must reach: points that miss it
+/// are placed anew before the last rounds.
+std::optional<Result> saturated_near(const PredictorRecord& record, const Settings& e, const Result& straight,
+                                     double largest_wb) {
   constexpr double kMiss = 0.02;
-  Result first = saturated_start(straight, largest_wb);
-  const double reached_wb = refine_with<SaturatedInductionModel>(record, e, first, nullptr).largest_wb;
-  const bool misses = reached_wb > 0.0 && std::abs(reached_wb / first.curve_wb.back() - 1.0) > kMiss;
-  if (!misses || !magnetising_curve(first).rises()) return first;
-  Result again = saturated_start(straight, reached_wb, &first);
-  refine_with<SaturatedInductionModel>(record, e, again, &first);
-  return again;
+  Result rough = saturated_start(straight, largest_wb);
+  auto first = fitted<SaturatedInductionModel>(record, e, rough, {.rounds = kFirstCurveRounds});
+  if (!first.fit.found) return {};
+  first.predictor.filter(SaturatedInductionModel(first.trial, e), first.noise);
+  const double reached_wb = largest_flux_wb(first.predictor.filtered(), record);
+  const bool misses = std::abs(reached_wb / largest_wb - 1.0) > kMiss;
+  Result result = misses && magnetising_curve(first.trial).rises()
+                      ? saturated_start(straight, reached_wb, &first.trial)
+                      : saturated_start(straight, largest_wb);
+  const Begin there = {.near = &first.trial, .noise = first.noise, .rounds = kCurveRounds};
+  auto last = fitted<SaturatedInductionModel>(record, e, result, there, std::move(first.predictor));
+  if (!last.fit.found) return {};
+  judge(record, e, last, {}, result);
+  if (!result.explanation->holds) return {};
+  return result;
 }
 
 /// An induction motor: straight if that explains the record, else with a magnetising curve if that does.
 void refine_induction(const MeasuredData& data, const Settings& e, const PredictorRecord& record,
                       Result& result, const Result* near) {
-  const Iron straight = refine_with<InductionModel>(record, e, result, near);
-  if (straight.largest_wb == 0.0 || result.explanation->holds) return;
-  Result saturated = saturated_near(from_rest(record, data, e), e, result, straight.largest_wb);
-  if (!saturated.explanation || !saturated.explanation->holds) return;
-  if (saturated.excitation.sufficient) {
-    std::ranges::move(unseen_split(saturated), std::back_inserter(saturated.excitation.unseen));
-    saturated.notes.push_back(curve_note(saturated));
-    result = std::move(saturated);
-  } else if (straight.bend && straight.bend->evidence > kTellsBend) {
-    result.excitation = verdict_on_open_curve(saturated);
+  auto straight = fitted<InductionModel>(record, e, result, begin_near(near, record, e));
+  if (!straight.fit.found) return refuse_unfitted(e, straight.unknowns, result);
+  put_fit(e, straight.unknowns, straight.fit, result);
+  const Iron iron = straight_of(straight.predictor, straight.fit, straight.unknowns,
+                                BendingInductionModel(straight.trial, e));
+  const bool bends = iron.bend && iron.bend->evidence > kTellsBend;
+  const auto find_curve = [&] {
+    return saturated_near(from_rest(record, data, e), e, result, iron.largest_wb);
+  };
+  std::optional<Result> saturated;
+  if (bends) saturated = find_curve();
+  if (!saturated || !saturated->excitation.sufficient) judge(record, e, straight, iron, result);
+  if (!bends && !result.explanation->holds) saturated = find_curve();
+  if (!saturated) return;
+  if (saturated->excitation.sufficient) {
+    std::ranges::move(unseen_split(*saturated), std::back_inserter(saturated->excitation.unseen));
+    saturated->notes.push_back(curve_note(*saturated));
+    result = *std::move(saturated);
+  } else if (bends) {
+    result.excitation = verdict_on_open_curve(*saturated);
   }
 }
 

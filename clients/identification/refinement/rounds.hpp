@@ -12,31 +12,48 @@
 
 namespace drivebench::identification {
 
-inline constexpr int kRounds = 2;           ///< of linearisation, Gauss-Newton and noise
-inline constexpr int kSaturatedRounds = 4;  ///< of a motor with a magnetising curve, until the noises stand
+/// Rounds of linearisation, Gauss-Newton and noise; the last of them are fine.
+struct Rounds {
+  int first;
+  int end;
+  int fine;  ///< from this one on; after it a fit ends once the noises stand
+};
+inline constexpr Rounds kRounds = {.first = 0, .end = 2, .fine = 1};
+inline constexpr Rounds kNearRounds = {.first = 1, .end = 2, .fine = 1};  ///< near a fit, with its noises
+/// Of a motor with a magnetising curve, until its largest flux is known, and from there on.
+inline constexpr Rounds kFirstCurveRounds = {.first = 0, .end = 2, .fine = 2};
+inline constexpr Rounds kCurveRounds = {.first = 2, .end = 4, .fine = 2};
 inline constexpr double kHopeless =
     25.0;  ///< mean square of the first round's innovations, where 1 is expected
 inline constexpr double kNearStep = 0.03;      ///< in which derivatives stand
 inline constexpr double kRoughly = 0.1;        ///< of a standard deviation: what a round leaves to the next
 inline constexpr double kFinely = 0.01;        ///< what the last one leaves
 inline constexpr double kLargestChange = 0.7;  ///< of a logarithm in a step
+inline constexpr int kMostSteps = 15;          ///< of a round
+inline constexpr int kMostFirstSteps = 8;      ///< of the first round of a curve, which takes 2 to 6
 
-/// The noises of voltages and currents that make the likelihood greatest, each to a fifth.
+/// The noises of voltages and currents that make the likelihood of so many samples greatest, each to a fifth.
 template <class Model>
 SensorNoise likeliest(Predictor<Model>& predictor, const Model& model, SensorNoise noise,
-                      const SensorNoise& least, const SensorNoise& most) {
-  double best = predictor.unlikelihood(model, noise);
+                      const SensorNoise& least, const SensorNoise& most, std::size_t samples) {
+  Course best = predictor.course(model, noise, samples, {});
+  std::vector<SensorNoise> tried{noise};  // none of them is better than `noise`
+  const auto take_if_better = [&](const SensorNoise& there) {
+    if (std::ranges::find(tried, there) != tried.end()) return false;
+    tried.push_back(there);
+    Course course = predictor.course(model, there, samples, best);
+    if (!(course.end < best.end)) return false;
+    best = std::move(course);
+    noise = there;
+    return true;
+  };
   const auto improve = [&](double SensorNoise::*which, double factor) {
     bool any = false;
     for (const double by : {factor, 1.0 / factor}) {
       while (true) {
         SensorNoise there = noise;
         there.*which = std::clamp(there.*which * by, least.*which, most.*which);
-        if (there.*which == noise.*which) break;
-        const double value = predictor.unlikelihood(model, there);
-        if (!(value < best)) break;
-        best = value;
-        noise = there;
+        if (!take_if_better(there)) break;
         any = true;
       }
       if (any) break;
@@ -69,10 +86,8 @@ class MotorResiduals {
     put(unknowns_, at, trial_);
     if (!is_motor(trial_)) return false;
     predictor_.correct(errors_of(trial_));
-    if (!predictor_.innovations(Model(trial_, settings_), out)) return false;
-    if (split_ < 0) return true;
-    out.conservativeResize(out.size() + 1);
-    out(out.size() - 1) = split_weight * at(split_);
+    if (!predictor_.innovations(Model(trial_, settings_), out, own_rows())) return false;
+    if (split_ >= 0) out(out.size() - 1) = split_weight * at(split_);
     return true;
   }
 
@@ -89,13 +104,11 @@ class MotorResiduals {
       put(unknowns_, there, trial_);
       if (!is_motor(trial_)) return false;
       const SensorErrors seen = errors_of(trial_);
-      moved.push_back({.model = Model(trial_, settings_), .errors = seen, .sensors = !(seen == errors)});
+      moved.push_back(
+          {.model = Model(trial_, settings_), .errors = seen, .sensors = !(seen == errors), .drives = true});
     }
-    if (!predictor_.derivatives(model, moved, kDifference, out)) return false;
-    if (split_ < 0) return true;
-    out.conservativeResize(out.rows() + 1, Eigen::NoChange);
-    out.row(out.rows() - 1).setZero();
-    out(out.rows() - 1, split_) = split_weight;
+    if (!predictor_.derivatives(model, moved, kDifference, out, own_rows())) return false;
+    if (split_ >= 0) out(out.rows() - 1, split_) = split_weight;
     return true;
   }
 
@@ -103,6 +116,8 @@ class MotorResiduals {
 
  private:
   static constexpr double kDifference = 1e-5;
+
+  Eigen::Index own_rows() const noexcept { return split_ < 0 ? 0 : 1; }
 
   Predictor<Model>& predictor_;
   const std::vector<Unknown>& unknowns_;
@@ -118,12 +133,13 @@ inline bool stands(const SensorNoise& noise, const SensorNoise& before) {
   return same(noise.voltage_v, before.voltage_v) && same(noise.current_a, before.current_a);
 }
 
-/// The fit in rounds; `noise` begins the first round and becomes that of the last. A fit that begins near has
-/// the last round alone, with the noise that it is given; a curve whose points moved explains more than the
-/// one it begins from, so its noise is found again.
+/// The fit in rounds; `noise` begins the first round and becomes that of the last. A straight fit that begins
+/// near has the noise that it is given; that of a curve is found again. A curve whose first round does not
+/// end is none: what it takes over has no bottom.
 template <class Model>
 Fit fit_in_rounds(const PredictorRecord& record, const Settings& e, Predictor<Model>& predictor,
-                  const std::vector<Unknown>& unknowns, Result& trial, SensorNoise& noise, bool near) {
+                  const std::vector<Unknown>& unknowns, Result& trial, SensorNoise& noise,
+                  const Rounds& rounds) {
   constexpr double kHeldSplit = 30.0;  // until the curve has its shape
   const SensorNoise first = first_noise(record, e);
   const double voltage_rms_v = record.voltages.rms(record.range);
@@ -142,23 +158,29 @@ Fit fit_in_rounds(const PredictorRecord& record, const Settings& e, Predictor<Mo
     predictor.correct(errors_of(trial));
     return Model(trial, e);
   };
-  const int rounds = is_saturated(trial) ? kSaturatedRounds : kRounds;
+  const bool curved = is_saturated(trial);
   Fit fit;
   fit.at = coordinates_of(unknowns, trial);
   fit.found = true;
-  for (int round = near ? rounds - 1 : 0; round < rounds && fit.found; ++round) {
+  for (int round = rounds.first; round < rounds.end && fit.found; ++round) {
     const SensorNoise before = noise;
     predictor.linearise(model_at(fit.at), noise);
-    if (round > 0 && (!near || is_saturated(trial))) {
+    if (round > 0 && (rounds.first == 0 || curved)) {
       noise.current_a = first.current_a;
-      noise = likeliest(predictor, model_at(fit.at), noise, least, most);
+      noise = likeliest(predictor, model_at(fit.at), noise, least, most,
+                        curved ? predictor.samples() : predictor.kUsualSamples);
     }
     motors.split_weight = round == 0 ? kHeldSplit : 1.0;
-    const bool last = round + 1 >= rounds || round > 1;
+    const bool fine = round >= rounds.fine;
     fit = gauss_newton(residuals, fit.at,
-                       {.limit = kLargestChange, .near = kNearStep, .small = last ? kFinely : kRoughly});
+                       {.limit = kLargestChange,
+                        .near = kNearStep,
+                        .small = fine ? kFinely : kRoughly,
+                        .most = curved && round == 0 ? kMostFirstSteps : kMostSteps,
+                        .covariance = fine});
     if (round == 0 && fit.sum > kHopeless * static_cast<double>(predictor.rows())) fit.found = false;
-    if (round > 1 && stands(noise, before)) break;
+    if (round == 0 && curved && !fit.ended) fit.found = false;
+    if (fine && stands(noise, before)) break;
   }
   model_at(fit.at);
   return fit;

@@ -49,14 +49,15 @@ void add_phases(const Settings& e, const PredictorRecord& record, const SensorEr
 /// scatter over parts of the record once the residuals are freed of `amount` of the direction. What the error
 /// itself adds to the scatter would hide it: 64 equal parts never show more than 8 standard deviations, and
 /// one part that tells all shows 1.
-double score_variance(const Eigen::VectorXd& direction, const Eigen::VectorXd& residual, double amount) {
-  const Eigen::VectorXd freed = residual + amount * direction;
+double score_variance(const Eigen::Ref<const Eigen::VectorXd>& direction, const Eigen::VectorXd& residual,
+                      double amount) {
   const Eigen::Index rows = residual.size();
   double scatter = 0.0;
   for (Eigen::Index part = 0; part < kScoreParts; ++part) {
     const Eigen::Index first = part * rows / kScoreParts;
     const Eigen::Index count = (part + 1) * rows / kScoreParts - first;
-    const double score = direction.segment(first, count).dot(freed.segment(first, count));
+    const auto own = direction.segment(first, count);
+    const double score = own.dot(residual.segment(first, count)) + amount * own.squaredNorm();
     scatter += score * score;
   }
   return std::max(direction.squaredNorm(), scatter);
@@ -98,16 +99,16 @@ double telling_deviations(std::size_t suspects) {
 
 std::optional<Suspicion> strongest_suspicion(const Fit& fit, const std::vector<Unknown>& unknowns,
                                              const std::vector<Suspect>& suspects,
-                                             const Eigen::MatrixXd& directions) {
+                                             Eigen::MatrixXd directions) {
   constexpr double k95 = 1.96;
   const Eigen::LDLT<Eigen::MatrixXd> information(fit.jacobian.transpose() * fit.jacobian);
   const Eigen::MatrixXd moves = information.solve(fit.jacobian.transpose() * directions);
-  const Eigen::MatrixXd unexplained = directions - fit.jacobian * moves;
+  directions.noalias() -= fit.jacobian * moves;  // what no parameter can take over
   const double tells = telling_deviations(suspects.size());
   std::optional<Suspicion> strongest;
   for (std::size_t n = 0; n < suspects.size(); ++n) {
     const auto column = static_cast<Eigen::Index>(n);
-    const Eigen::VectorXd own = unexplained.col(column);
+    const auto own = directions.col(column);
     const double seen = own.squaredNorm();
     if (!(seen > 0.0)) continue;
     const double score = own.dot(fit.residual);

@@ -49,6 +49,6 @@ struct Suspicion {
 /// variance. `directions` are the derivatives of the innovations by the amount of each suspect.
 std::optional<Suspicion> strongest_suspicion(const Fit& fit, const std::vector<Unknown>& unknowns,
                                              const std::vector<Suspect>& suspects,
-                                             const Eigen::MatrixXd& directions);
+                                             Eigen::MatrixXd directions);
 
 }  // namespace drivebench::identification

@@ -74,6 +74,19 @@ TEST(Saturation, TheFirstCountOfAMotorAtRestIsOneError) {
   }
 }
 
+// The converters' voltages have 0.25 V of noise: a step of 0.244 V and its rounding. The first 4,000 of the
+// 20,000 samples of this start are explained as well without it. Catches: a noise that a part of the record
+// tells, 0.027 V, which is its bound, and intervals that are too small for it: tau_L lies at 2.1 of them.
+TEST(Saturation, TheWholeRecordTellsTheNoiseOfTheVoltages) {
+  const Saturated c(8);
+  const Result r = identify(c.run.data, c.run.how);
+  ASSERT_TRUE(r.excitation.sufficient) << to_markdown(r);
+  EXPECT_GT(r.explanation->voltage_noise_v, 0.1);
+  EXPECT_LT(r.explanation->voltage_noise_v, 0.6);
+  const Estimate& load = *r.find("tau_L");
+  EXPECT_LT(std::abs(load.value - c.motor[5]), 1.6 * *load.interval) << to_markdown(r);
+}
+
 // Voltages of another instant look like iron that bends: half a period late or early costs a straight motor
 // 18 % of L_S with a curve. Catches: a curve that takes over an error of the record.
 TEST(Saturation, AWrongShiftOfTheVoltagesIsNoCurve) {
