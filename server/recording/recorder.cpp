@@ -33,7 +33,9 @@ std::size_t recorder_ring_entries(const BenchConfig& config) noexcept {
 
 Recorder::Recorder(const std::filesystem::path& file, const BenchConfig& config,
                    std::initializer_list<RecordingAttachment> attachments, const RecordingOptions& options)
-    : ring_(recorder_ring_entries(config)),
+    // Without real time a tick may wait for a page, and a short run needs few of them.
+    : ring_(recorder_ring_entries(config),
+            config.mode == RunMode::kRealtime ? Pages::kTouched : Pages::kUntouched),
       room_for_tick_(config.axes.size() + kInputsPerLook),
       writer_(std::make_unique<RecordingWriter>(file, config, attachments, options)) {
   tell_state();
