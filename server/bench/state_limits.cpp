@@ -61,7 +61,7 @@ bool is_possible(const PhaseCommand& command) noexcept {
 bool is_possible(const DriveMemory& m) noexcept {
   return std::ranges::all_of(m.commands, [](const PhaseCommand& c) { return is_possible(c); }) &&
          m.pwm_segment >= 0 && m.pwm_segment < static_cast<std::int64_t>(kMaxSegmentsOfPattern) &&
-         is_quantity(m.bus_v);
+         is_quantity(m.bus_v) && m.bus_v >= 0.0;
 }
 
 /// The faults keep to the limits that a client meets.
