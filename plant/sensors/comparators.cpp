@@ -43,10 +43,8 @@ double zero_between(const F& f, double from_s, double from_value, double to_s, d
   return at_s;
 }
 
-}  // namespace
-
 /// Terminal less reference at three instants of an interval.
-struct Comparators::Difference {
+struct Difference {
   double start_v;
   double middle_v;
   double end_v;
@@ -54,6 +52,8 @@ struct Comparators::Difference {
   /// The control point of the parabola: it lies between its ends and this one.
   double control_v() const noexcept { return 2.0 * middle_v - 0.5 * (start_v + end_v); }
 };
+
+}  // namespace
 
 /// What a comparator sees t after the start of an interval. With u = u0 + u1 t + u2 t² before the RC,
 ///   RC y' = u - y     y = (u0 - u1 RC + 2 u2 RC²) + (u1 - 2 u2 RC) t + u2 t² + C e^(-t/RC)
@@ -192,23 +192,15 @@ void Comparators::follow(ComparatorMemory& m, Tick tick, double start_s, double 
     double& y = filtered_v[index_of(k)];
     const double before_v = filters ? y : u.start_v;
     if (filters) input.filter(p_.rc_s, y);
-    const Span span = span_of(u, before_v, 1.0 - decay);
+    // An RC stays between where it was and what it is given.
+    const auto [lowest_v, highest_v] = std::minmax({before_v, u.start_v, u.control_v(), u.end_v});
+    const Span span{.lowest_v = lowest_v, .highest_v = highest_v};
     if (away_v(m, k, span) < kMostNoise * p_.noise_rms_v) {
       switch_within(m, {k, tick, start_s, log}, input, span, duration_s);
     }
     y = filters ? input.at(duration_s, decay) : u.end_v;
   }
   m.filtered_v = {.a = filtered_v[0], .b = filtered_v[1], .c = filtered_v[2]};
-}
-
-/// An RC goes towards what it is given, by the part of the way that is left of its exponential. The parabola
-/// of the input lies between its ends and its control point.
-Comparators::Span Comparators::span_of(const Difference& u, double before_v, double part) noexcept {
-  constexpr double kRounding = 1e-9;
-  const auto [lowest_v, highest_v] = std::minmax({before_v, u.start_v, u.control_v(), u.end_v});
-  const double rounding_v = kRounding * (highest_v - lowest_v);
-  return {.lowest_v = before_v - part * (before_v - lowest_v) - rounding_v,
-          .highest_v = before_v + part * (highest_v - before_v) + rounding_v};
 }
 
 double Comparators::away_v(const ComparatorMemory& m, int terminal, const Span& span) const noexcept {

@@ -68,7 +68,6 @@ class Comparators {
 
  private:
   class Input;
-  struct Difference;
   /// Where and when a comparator looks.
   struct Place {
     int terminal;
@@ -83,8 +82,6 @@ class Comparators {
     double highest_v;
   };
 
-  /// Of an input that was at before_v, in an interval of which its RC takes this part of the way to `u`.
-  static Span span_of(const Difference& u, double before_v, double part) noexcept;
   double offset_v(int terminal) const noexcept;
   /// The voltage that is missing to the threshold; negative: the input is beyond it somewhere.
   double away_v(const ComparatorMemory& m, int terminal, const Span& span) const noexcept;
