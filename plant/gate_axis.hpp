@@ -154,7 +154,8 @@ class GateAxis {
   void catch_up();
   bool is_possible(const Saved& saved) const noexcept;
   bool is_possible(const Logged& event) const noexcept;
-  /// Whether the count is that of the angle, a thousand turns aside, or nobody asks for it.
+  /// Whether the count of sectors differs by a thousand turns at most from that of the rotor's angle. Without
+  /// Hall sensors every count is possible.
   bool is_possible_hall_count(std::int64_t count, const AxisState& state) const noexcept;
   Now seen() const;
   /// Lets a piece end now.

@@ -21,7 +21,8 @@ std::vector<std::byte> GateAxis::save() {
 bool GateAxis::is_possible_hall_count(std::int64_t count, const AxisState& state) const noexcept {
   if (!axis_.parameters().sensors.hall.enabled) return true;
   const std::int64_t there = hall_.count_at(state.shaft.angle_rad, state.turns);
-  const auto most = static_cast<std::int64_t>(6000.0 * pole_pairs_);
+  constexpr double kMostTurns = 1000.0;
+  const auto most = static_cast<std::int64_t>(6.0 * kMostTurns * pole_pairs_);
   return count >= there - most && count <= there + most;
 }
 

@@ -7,7 +7,7 @@
 
 #include "protocols/mcap/mcap_series.hpp"
 #include "protocols/mcap/time_base.hpp"
-#include "server/host/print_line.hpp"
+#include "server/host/logging/print_line.hpp"
 #include "server/recording/replay.hpp"
 
 namespace drivebench {

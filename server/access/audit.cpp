@@ -8,7 +8,7 @@
 #include "plant/parameters/parameters.hpp"
 #include "protocols/json.hpp"
 #include "server/access/address.hpp"
-#include "server/host/log.hpp"
+#include "server/host/logging/log.hpp"
 #include "server/host/wall_time.hpp"
 
 namespace drivebench {

@@ -14,7 +14,7 @@
 #include "server/bench/bench.hpp"
 #include "server/bench/change_requests.hpp"
 #include "server/config/grants.hpp"
-#include "server/host/log_level.hpp"
+#include "server/host/logging/log_level.hpp"
 
 namespace drivebench {
 

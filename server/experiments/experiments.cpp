@@ -10,7 +10,7 @@
 
 #include "protocols/text.hpp"
 #include "server/config/experiment_limits.hpp"
-#include "server/host/log.hpp"
+#include "server/host/logging/log.hpp"
 #include "server/recording/input_codec.hpp"
 
 namespace drivebench {

@@ -19,7 +19,7 @@
 #include "server/experiments/experiments.hpp"
 #include "server/experiments/row_file.hpp"
 #include "server/host/holder.hpp"
-#include "server/host/log.hpp"
+#include "server/host/logging/log.hpp"
 #include "server/recording/recording_file.hpp"
 
 namespace drivebench {

@@ -10,7 +10,7 @@
 #include <system_error>
 #include <utility>
 
-#include "server/host/log.hpp"
+#include "server/host/logging/log.hpp"
 
 namespace drivebench {
 namespace {

@@ -14,7 +14,7 @@
 #include "protocols/sample_codec.hpp"
 #include "protocols/signals/catalogue.hpp"
 #include "server/host/build_id.hpp"
-#include "server/host/log.hpp"
+#include "server/host/logging/log.hpp"
 #include "server/recording/recording.hpp"
 
 namespace drivebench {

@@ -40,7 +40,7 @@ SYSTEM = {
 
 # Headers that cost seconds in each file that includes them, and the files that may.
 COSTLY = {
-    "spdlog/": ("server/host/log.cpp",),
+    "spdlog/": ("server/host/logging/log.cpp",),
     "toml++/": ("protocols/document.cpp",),
     "CLI/": ("protocols/pages", "server/command_line.cpp", "clients/command/common/line/command_line.hpp"),
     "boost/beast": ("clients/web/gateway",),
@@ -61,6 +61,7 @@ ORDERED = {
 FOUNDATIONS = {
     "plant/axis_parameters.hpp",
     "plant/axis_state.hpp",
+    "plant/drive/phases.hpp",
     "plant/faults.hpp",
     "plant/injected_faults.hpp",
     "plant/problem.hpp",
@@ -73,6 +74,7 @@ FOUNDATIONS = {
     "protocols/refusals.hpp",
     "protocols/text.hpp",
     "server/config/config.hpp",
+    "server/host/wall_time.hpp",
     "server/config/grants.hpp",
     "server/config/strict_table.hpp",
     "server/config/words.hpp",

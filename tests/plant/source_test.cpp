@@ -1,4 +1,4 @@
-#include "plant/drive/source.hpp"
+#include "plant/drive/supply/source.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "plant/drive/transformer.hpp"
+#include "plant/drive/supply/transformer.hpp"
 
 #include <gtest/gtest.h>
 

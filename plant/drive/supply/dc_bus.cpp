@@ -1,4 +1,4 @@
-#include "plant/drive/dc_bus.hpp"
+#include "plant/drive/supply/dc_bus.hpp"
 
 #include <algorithm>
 #include <cmath>

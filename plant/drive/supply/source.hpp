@@ -2,7 +2,7 @@
 
 #include <cstdint>
 
-#include "plant/drive/current_trend.hpp"
+#include "plant/drive/supply/current_trend.hpp"
 #include "plant/math/curve.hpp"
 #include "plant/windings.hpp"
 

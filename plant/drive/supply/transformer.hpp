@@ -1,6 +1,6 @@
 #pragma once
 
-#include "plant/drive/current_trend.hpp"
+#include "plant/drive/supply/current_trend.hpp"
 
 namespace drivebench {
 

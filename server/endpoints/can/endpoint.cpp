@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <utility>
 
-#include "server/host/log.hpp"
+#include "server/host/logging/log.hpp"
 
 namespace drivebench::can {
 namespace {

@@ -4,7 +4,7 @@
 #include <algorithm>
 
 #include "server/endpoints/can/endpoint.hpp"
-#include "server/host/log.hpp"
+#include "server/host/logging/log.hpp"
 
 namespace drivebench::can {
 

@@ -5,7 +5,7 @@
 #include "plant/faults.hpp"
 #include "server/access/address.hpp"
 #include "server/endpoints/modbus/map_info.hpp"
-#include "server/host/log.hpp"
+#include "server/host/logging/log.hpp"
 
 namespace drivebench::modbus {
 

@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <string_view>
 
-#include "server/host/log.hpp"
+#include "server/host/logging/log.hpp"
 
 namespace drivebench::modbus {
 namespace {

@@ -8,7 +8,7 @@
 #include <stdexcept>
 
 #include "server/endpoints/modbus/map_info.hpp"
-#include "server/host/log.hpp"
+#include "server/host/logging/log.hpp"
 
 namespace drivebench {
 namespace {

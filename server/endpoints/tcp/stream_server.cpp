@@ -8,7 +8,7 @@
 
 #include "server/access/address.hpp"
 #include "server/host/holder.hpp"
-#include "server/host/log.hpp"
+#include "server/host/logging/log.hpp"
 
 namespace drivebench {
 namespace {

@@ -1,4 +1,4 @@
-#include "server/host/json_log.hpp"
+#include "server/host/logging/json_log.hpp"
 
 #include <nlohmann/json.hpp>
 

@@ -1,4 +1,4 @@
-#include "server/host/log.hpp"
+#include "server/host/logging/log.hpp"
 
 #include <spdlog/formatter.h>
 #include <spdlog/sinks/stdout_sinks.h>
@@ -7,7 +7,7 @@
 #include <array>
 #include <memory>
 
-#include "server/host/json_log.hpp"
+#include "server/host/logging/json_log.hpp"
 
 namespace drivebench::log {
 namespace {

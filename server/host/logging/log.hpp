@@ -5,7 +5,7 @@
 #include <string>
 #include <utility>
 
-#include "server/host/log_level.hpp"
+#include "server/host/logging/log_level.hpp"
 
 /// The log of this program, on standard error. Any thread may write.
 namespace drivebench::log {

@@ -15,7 +15,7 @@
 #include <string>
 #include <string_view>
 
-#include "server/host/log.hpp"
+#include "server/host/logging/log.hpp"
 #include "tests/adversity/simulator/week.hpp"
 #include "tests/adversity/simulator/world/world.hpp"
 #include "tests/server/recording/run_config.hpp"

@@ -21,7 +21,7 @@ std::uint64_t digest_of(std::span<const std::byte> bytes) {
   return hash;
 }
 
-/// As whoever knows the format would: the digest is no signature.
+/// Writes the digest that fits the changed bytes. Every client can: the digest has no secret.
 void sign(std::vector<std::byte>& state) {
   const std::uint64_t digest = digest_of(std::span(state).subspan(kDigestAt + 8));
   std::memcpy(state.data() + kDigestAt, &digest, sizeof digest);

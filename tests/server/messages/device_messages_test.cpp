@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "server/host/log.hpp"
+#include "server/host/logging/log.hpp"
 #include "tests/server/engine/engine_requests.hpp"
 #include "tests/server/recording/run_config.hpp"
 

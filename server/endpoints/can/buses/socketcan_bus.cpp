@@ -3,7 +3,7 @@
 #include "server/endpoints/can/buses/backends.hpp"
 #include "server/endpoints/can/buses/error_report.hpp"
 #include "server/endpoints/can/buses/virtual_bus.hpp"
-#include "server/host/log.hpp"
+#include "server/host/logging/log.hpp"
 
 #include <fmt/core.h>
 #include <linux/can/raw.h>

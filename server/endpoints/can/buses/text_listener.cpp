@@ -8,7 +8,7 @@
 
 #include "protocols/can/formats/text.hpp"
 #include "server/config/config.hpp"
-#include "server/host/log.hpp"
+#include "server/host/logging/log.hpp"
 
 namespace drivebench::can {
 namespace {

@@ -18,7 +18,7 @@
 #include "server/endpoints/can/buses/send_queue.hpp"
 #include "server/endpoints/can/buses/virtual_bus.hpp"
 #include "server/endpoints/log_limit.hpp"
-#include "server/host/log.hpp"
+#include "server/host/logging/log.hpp"
 
 namespace drivebench::can {
 namespace {

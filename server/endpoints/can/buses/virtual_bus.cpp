@@ -8,7 +8,7 @@
 #include <stdexcept>
 #include <system_error>
 
-#include "server/host/log.hpp"
+#include "server/host/logging/log.hpp"
 
 namespace drivebench::can {
 namespace {

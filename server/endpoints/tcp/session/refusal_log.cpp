@@ -1,6 +1,6 @@
 #include "server/endpoints/tcp/session/refusal_log.hpp"
 
-#include "server/host/log.hpp"
+#include "server/host/logging/log.hpp"
 
 namespace drivebench {
 

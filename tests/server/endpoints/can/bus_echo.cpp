@@ -13,7 +13,7 @@
 
 #include "server/endpoints/can/buses/backends.hpp"
 #include "server/host/asio.hpp"
-#include "server/host/log.hpp"
+#include "server/host/logging/log.hpp"
 
 namespace {
 
