@@ -97,7 +97,8 @@ std::vector<Row> measure_memory() {
   Server server({command::find_config("servo-realtime").string(), "--unix", path});
   const pid_t pid = listener_of(path);
   auto controller = std::make_unique<Controller>(server.address());
-  auto viewers = std::make_unique<Viewers>(server.address(), kViewers, kDecimation);
+  auto viewers = std::make_unique<Viewers>(server.address(), kViewers);
+  viewers->watch(kDecimation);
 
   const auto begin = std::chrono::steady_clock::now();
   const auto soak = std::chrono::duration<double, std::ratio<60>>(planned(plan().soak_minutes, 0.01));

@@ -22,14 +22,17 @@ constexpr int kLowestPriority = 19;
 
 }  // namespace
 
-Viewers::Viewers(const std::string& address, int count, std::uint32_t decimation) {
-  for (int i = 0; i < count; ++i) {
+Viewers::Viewers(const std::string& address, int count) {
+  for (int i = 0; i < count; ++i)
     links_.push_back(std::make_unique<link::Link>(address));
-    links_.back()->subscribe(0, decimation);
-  }
+}
+
+void Viewers::watch(std::uint32_t decimation) {
+  for (const auto& each : links_)
+    each->subscribe(0, decimation);
   thread_ = std::thread([this] {
     try {
-      watch();
+      read();
     } catch (const std::exception& error) {
       fmt::print(stderr, "a viewer: {}\n", error.what());
       failed_.store(true);
@@ -39,10 +42,10 @@ Viewers::Viewers(const std::string& address, int count, std::uint32_t decimation
 
 Viewers::~Viewers() {
   stop_.store(true);
-  thread_.join();
+  if (thread_.joinable()) thread_.join();
 }
 
-void Viewers::watch() {
+void Viewers::read() {
   // They stand for other computers: no measured thread may wait for them.
   check(::setpriority(PRIO_PROCESS, static_cast<id_t>(::gettid()), kLowestPriority) == 0, "setpriority");
   while (!stop_.load()) {

@@ -14,11 +14,13 @@ namespace drivebench::speed {
 /// Clients that read all their samples, on a thread of their own until this object goes.
 class Viewers {
  public:
-  /// Each has a sample every so many ticks.
-  Viewers(const std::string& address, int count, std::uint32_t decimation);
+  Viewers(const std::string& address, int count);
   ~Viewers();
   Viewers(const Viewers&) = delete;
   Viewers& operator=(const Viewers&) = delete;
+
+  /// Each has a sample every so many ticks from now on.
+  void watch(std::uint32_t decimation);
 
   /// Whether one of them has lost its link.
   bool failed() const { return failed_.load(); }
@@ -26,7 +28,7 @@ class Viewers {
   std::uint64_t dropped() const { return dropped_.load(); }
 
  private:
-  void watch();
+  void read();
 
   std::vector<std::unique_ptr<link::Link>> links_;
   std::atomic<bool> stop_{false};

@@ -10,7 +10,7 @@ void Outbox::send(std::span<const std::byte> bytes, const std::shared_ptr<void>&
   if (!writing_) {
     boost::system::error_code error;
     const std::size_t written = socket_.write_some(asio::buffer(bytes.data(), bytes.size()), error);
-    if (error && error != asio::error::would_block && error != asio::error::try_again) return close();
+    if (error && error != asio::error::would_block && error != asio::error::try_again) return lose(error);
     bytes = bytes.subspan(error ? 0 : written);
     if (bytes.empty()) return;
   }
@@ -63,7 +63,8 @@ void Outbox::write_more(const std::shared_ptr<void>& owner) {
   const std::vector<std::byte>& first = chunks_.front();
   socket_.async_write_some(asio::buffer(first.data() + sent_, first.size() - sent_),
                            [this, owner](const boost::system::error_code& error, std::size_t written) {
-                             if (error || !socket_.is_open()) return close();
+                             if (error) return lose(error);
+                             if (!socket_.is_open()) return close();
                              sent_ += written;
                              forget(written);
                              expect_progress(owner);
@@ -77,6 +78,11 @@ void Outbox::expect_progress(const std::shared_ptr<void>& owner) {
 
 void Outbox::cut_deaf() {
   cut("it took nothing for " + std::to_string(kNoProgressLimit.count()) + " s");
+}
+
+void Outbox::lose(const boost::system::error_code& error) {
+  if (error != asio::error::timed_out) return close();
+  cut("its computer acknowledged nothing for 3 s");
 }
 
 void Outbox::cut(std::string_view why) {

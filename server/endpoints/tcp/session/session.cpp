@@ -79,6 +79,7 @@ asio::awaitable<void> Session::run() {
     if (const auto pause = due_pause(); pause > pause.zero()) co_await rest(timer, pause);
   }
   timer.cancel();
+  if (error) dialogue_.outbox().lose(error);
   if (greeted_) dialogue_.audit("session_ended", "done", {{"reason", why_ended_}});
   over_ = true;
   fetch_.drop();
