@@ -164,12 +164,11 @@ std::optional<Suspicion> suspicion_of(const Predictor<Model>& predictor, const F
   const Model model(trial, e);
   const std::vector<Suspect> suspects = suspects_of(e, record, errors_of(trial));
   std::vector<Moved<Model>> moved;
-  moved.reserve(suspects.size());
-  for (const Suspect& suspect : suspects)
-    moved.push_back({.model = model,
-                     .errors = suspect.errors,
-                     .sensors = true,
-                     .drives = !suspect.errors.drives_as(errors_of(trial))});
+  for (const Suspect& suspect : suspects) {
+    for (const SensorErrors& errors : suspect.errors)
+      moved.push_back(
+          {.model = model, .errors = errors, .sensors = true, .drives = !errors.drives_as(errors_of(trial))});
+  }
   Eigen::MatrixXd directions;
   // No sensor moves the rows beyond those of the predictor.
   const Eigen::Index more_rows = fit.residual.size() - static_cast<Eigen::Index>(predictor.rows());

@@ -28,39 +28,38 @@ void add_phases(const Settings& e, const PredictorRecord& record, const SensorEr
       if (!known) {
         Suspect s{.what = fmt::format("an offset of {{:.3g}} {} of {}", current ? "A" : "V", name),
                   .remedy = fmt::format("--find {}-offsets looks for it", current ? "current" : "voltage"),
-                  .errors = at,
+                  .errors = {at},
                   .size = size};
-        (current ? s.errors.current_offset_a : s.errors.voltage_offset_v)[phase] += size;
+        (current ? s.errors[0].current_offset_a : s.errors[0].voltage_offset_v)[phase] += size;
         all.push_back(std::move(s));
       }
       if (phase > 0 && !e.sensors.gains) {
         Suspect s{.what = fmt::format("a gain of {} that is {{:.3g}} of itself beside that of phase a", name),
                   .remedy = "--find gains looks for it",
-                  .errors = at,
+                  .errors = {at},
                   .size = kSuspectPart};
-        (current ? s.errors.current_gain : s.errors.voltage_gain)[phase] += kSuspectPart;
+        (current ? s.errors[0].current_gain : s.errors[0].voltage_gain)[phase] += kSuspectPart;
         all.push_back(std::move(s));
       }
     }
   }
 }
 
-/// The variance of the sum of the products of direction and residuals: that of white residuals, or the
-/// scatter over parts of the record once the residuals are freed of `amount` of the direction. What the error
-/// itself adds to the scatter would hide it: 64 equal parts never show more than 8 standard deviations, and
-/// one part that tells all shows 1.
-double score_variance(const Eigen::Ref<const Eigen::VectorXd>& direction, const Eigen::VectorXd& residual,
-                      double amount) {
+/// The variance of the sum of the products of an error and residuals that hold its opposite: that of white
+/// residuals, or the scatter over parts of the record once the residuals are freed of the error. What the
+/// error itself adds to the scatter would hide it: 64 equal parts never show more than 8 standard deviations,
+/// and one part that tells all shows 1.
+double score_variance(const Eigen::VectorXd& error, const Eigen::VectorXd& residual) {
   const Eigen::Index rows = residual.size();
   double scatter = 0.0;
   for (Eigen::Index part = 0; part < kScoreParts; ++part) {
     const Eigen::Index first = part * rows / kScoreParts;
     const Eigen::Index count = (part + 1) * rows / kScoreParts - first;
-    const auto own = direction.segment(first, count);
-    const double score = own.dot(residual.segment(first, count)) + amount * own.squaredNorm();
+    const auto own = error.segment(first, count);
+    const double score = own.dot(residual.segment(first, count)) + own.squaredNorm();
     scatter += score * score;
   }
-  return std::max(direction.squaredNorm(), scatter);
+  return std::max(error.squaredNorm(), scatter);
 }
 
 }  // namespace
@@ -68,9 +67,9 @@ double score_variance(const Eigen::Ref<const Eigen::VectorXd>& direction, const 
 std::vector<Suspect> suspects_of(const Settings& e, const PredictorRecord& record, const SensorErrors& at) {
   std::vector<Suspect> all;
   add_phases(e, record, at, all);
-  const auto add = [&](const char* what, const char* remedy, double size, auto member) {
-    Suspect s{.what = what, .remedy = remedy, .errors = at, .size = size};
-    member(s.errors) += size;
+  const auto add = [&](const char* what, const char* remedy, double size, auto... members) {
+    Suspect s{.what = what, .remedy = remedy, .errors = {}, .size = size};
+    (((members(s.errors.emplace_back(at))) += size), ...);
     all.push_back(std::move(s));
   };
   constexpr const char* kInstant =
@@ -83,9 +82,10 @@ std::vector<Suspect> suspects_of(const Settings& e, const PredictorRecord& recor
       [](SensorErrors& s) -> double& { return s.voltage_delay_s; });
   add("an encoder that is {:.3g} s late", "check when its counts are taken", delay_s,
       [](SensorErrors& s) -> double& { return s.angle_delay_s; });
-  for (const std::size_t k : {0U, 1U})
-    add("an encoder that is off its centre by {:.3g} rad once in a turn", "check how it is mounted",
-        kSuspectPart, [k](SensorErrors& s) -> double& { return s.eccentricity_rad[k]; });
+  add(
+      "an encoder that is off its centre by {:.3g} rad once in a turn", "check how it is mounted",
+      kSuspectPart, [](SensorErrors& s) -> double& { return s.eccentricity_rad[0]; },
+      [](SensorErrors& s) -> double& { return s.eccentricity_rad[1]; });
   const bool magnet = e.kind == MotorKind::kPmSynchronous || e.kind == MotorKind::kBldc;
   if (magnet && !e.sensors.zero)
     add("an encoder whose zero is off by {:.3g} rad electrical", "do not give the zero: the data show it",
@@ -106,21 +106,24 @@ std::optional<Suspicion> strongest_suspicion(const Fit& fit, const std::vector<U
   directions.noalias() -= fit.jacobian * moves;  // what no parameter can take over
   const double tells = telling_deviations(suspects.size());
   std::optional<Suspicion> strongest;
-  for (std::size_t n = 0; n < suspects.size(); ++n) {
-    const auto column = static_cast<Eigen::Index>(n);
-    const auto own = directions.col(column);
-    const double seen = own.squaredNorm();
+  Eigen::Index first = 0;
+  for (const Suspect& suspect : suspects) {
+    const auto count = static_cast<Eigen::Index>(suspect.errors.size());
+    const auto own = directions.middleCols(first, count);
+    const Eigen::VectorXd amounts = own.colPivHouseholderQr().solve(-fit.residual);
+    const Eigen::VectorXd move = moves.middleCols(first, count) * amounts;
+    first += count;
+    const Eigen::VectorXd error = own * amounts;
+    const double seen = error.squaredNorm();
     if (!(seen > 0.0)) continue;
-    const double score = own.dot(fit.residual);
-    const double amount = -score / seen;
-    Suspicion s{.what = fmt::format(fmt::runtime(suspects[n].what), amount * suspects[n].size),
-                .remedy = suspects[n].remedy,
-                .deviations = std::abs(score) / std::sqrt(score_variance(own, fit.residual, amount)),
+    const double amount = count == 1 ? amounts(0) : amounts.norm();
+    Suspicion s{.what = fmt::format(fmt::runtime(suspect.what), amount * suspect.size),
+                .remedy = suspect.remedy,
+                .deviations = seen / std::sqrt(score_variance(error, fit.residual)),
                 .tells = tells};
     for (std::size_t k = 0; k < unknowns.size(); ++k) {
       const auto row = static_cast<Eigen::Index>(k);
-      const double shift =
-          std::abs(moves(row, column) * amount) / (k95 * std::sqrt(fit.covariance(row, row)));
+      const double shift = std::abs(move(row)) / (k95 * std::sqrt(fit.covariance(row, row)));
       if (shift <= s.shift) continue;
       s.shift = shift;
       s.moved = unknowns[k].name;

@@ -15,9 +15,11 @@ namespace drivebench::identification {
 
 /// An error of the sensors that a fit does not look for, although it may be in the record.
 struct Suspect {
-  std::string what;     ///< with an amount of `{}` in its unit: "an offset of {} A of i_a_a"
-  std::string remedy;   ///< what to do about it
-  SensorErrors errors;  ///< those of the fit, and `size` of this one
+  std::string what;    ///< with an amount of `{}` in its unit: "an offset of {} A of i_a_a"
+  std::string remedy;  ///< what to do about it
+  /// Those of the fit, and `size` of this one; in each of its directions: an error that turns with the shaft
+  /// has two, its sine and its cosine.
+  std::vector<SensorErrors> errors;
   double size;
 };
 
@@ -46,7 +48,8 @@ struct Suspicion {
 /// move a parameter out of its interval; nothing if there is none. It is the score test of Lagrange
 /// multipliers, as test_bend(): what no unknown can take over of the error is compared with the innovations.
 /// Where what the error leaves of them scatters more than white ones over parts of the record, that is their
-/// variance. `directions` are the derivatives of the innovations by the amount of each suspect.
+/// variance. `directions` are the derivatives of the innovations by the amount of each suspect in each of its
+/// directions, which are asked together: neither of two may tell or move much where both do.
 std::optional<Suspicion> strongest_suspicion(const Fit& fit, const std::vector<Unknown>& unknowns,
                                              const std::vector<Suspect>& suspects,
                                              Eigen::MatrixXd directions);

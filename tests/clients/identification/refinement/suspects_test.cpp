@@ -33,14 +33,17 @@ Eigen::VectorXd noisy(std::mt19937_64& engine, double memory) {
   return noise;
 }
 
-/// What residuals that one mean was fitted to say of suspects with these derivatives.
-std::optional<Suspicion> asked(const Eigen::VectorXd& residual, const Eigen::MatrixXd& directions) {
+/// What residuals that one mean was fitted to say of suspects with these derivatives, in `each` of them.
+std::optional<Suspicion> asked(const Eigen::VectorXd& residual, const Eigen::MatrixXd& directions,
+                               std::size_t each = 1) {
   Fit fit;
   fit.residual = residual.array() - residual.mean();
   fit.jacobian = Eigen::MatrixXd::Ones(kRows, 1);
   fit.covariance = Eigen::MatrixXd::Constant(1, 1, 1.0 / kRows);
-  const std::vector<Suspect> suspects(static_cast<std::size_t>(directions.cols()),
-                                      {.what = "an error of {}", .remedy = "", .errors = {}, .size = 1.0});
+  const std::vector<SensorErrors> errors(each);
+  const std::vector<Suspect> suspects(
+      static_cast<std::size_t>(directions.cols()) / each,
+      {.what = "an error of {}", .remedy = "", .errors = errors, .size = 1.0});
   return strongest_suspicion(fit, {{.name = "mean"}}, suspects, directions);
 }
 
@@ -87,6 +90,26 @@ TEST(Suspects, AnErrorInOnePartOfTheRecordIsSeen) {
   EXPECT_NEAR(std::stod(found->what.substr(12)), 0.7, 0.07) << found->what;
 }
 
+// An error that turns with the shaft, at 45 degrees: its sine and its cosine show 3.5 standard deviations
+// each and move the mean by 0.8 of its interval, both together 5 and 1.6 (one must show 3.7, two 3.9).
+// Catches: two halves of one error that are asked apart, each of which looks harmless.
+TEST(Suspects, BothDirectionsOfAnErrorAreAskedTogether) {
+  constexpr double kMean = 0.317;
+  Eigen::MatrixXd turning(kRows, 2);
+  for (Eigen::Index k = 0; k < kRows; ++k) {
+    const double angle = 2.0 * std::numbers::pi * 20.0 * static_cast<double>(k) / kRows;
+    turning(k, 0) = kMean + std::sin(angle);
+    turning(k, 1) = kMean + std::cos(angle);
+  }
+  const double amount = 3.5 / std::sqrt(kRows / 2.0);
+  const Eigen::VectorXd residual = -amount * (turning.col(0) + turning.col(1));
+  EXPECT_FALSE(asked(residual, turning));
+  const std::optional<Suspicion> found = asked(residual, turning, 2);
+  ASSERT_TRUE(found);
+  EXPECT_NEAR(found->deviations, 3.5 * std::numbers::sqrt2, 1e-6);
+  EXPECT_NEAR(std::stod(found->what.substr(12)), amount * std::numbers::sqrt2, 1e-3 * amount) << found->what;
+}
+
 /// An error of the sensors in the record of a motor of the table, and what the verdict calls it.
 struct Disturbed {
   const char* motors;
@@ -121,6 +144,13 @@ void delay_encoder(MeasuredData& data, std::size_t samples) {
     count[k] = before[k - samples];
 }
 
+/// The encoder of 2000 counts sits off its centre: its angle strays by this much once in a turn.
+void put_off_centre(MeasuredData& data, double amplitude_rad, double phase_rad) {
+  constexpr double kPerRad = 2000.0 / (2.0 * std::numbers::pi);
+  for (double& count : column_of(data, "encoder_count"))
+    count = std::round(count + kPerRad * amplitude_rad * std::sin(count / kPerRad + phase_rad));
+}
+
 const std::vector<Disturbed>& disturbed() {
   static const std::vector<Disturbed> all = {
       {"DC motors", 75, [](MeasuredData& d) { filter(column_of(d, "u_a_v"), 0.66); }, "s late"},
@@ -130,6 +160,8 @@ const std::vector<Disturbed>& disturbed() {
            filter(column_of(d, name), 0.61);
        },
        "s late"},
+      {"DC motors", 116, [](MeasuredData& d) { put_off_centre(d, 0.0096, 2.55); }, "off its centre"},
+      {"DC motors", 168, [](MeasuredData& d) { put_off_centre(d, 0.0157, 4.27); }, "off its centre"},
       {"Brushless DC motors", 187, [](MeasuredData& d) { delay_encoder(d, 1); }, "an encoder that is"},
       {"Brushless DC motors", 83, [](MeasuredData& d) { multiply(column_of(d, "i_b_a"), 1.017); },
        "a gain of i_b_a"},
