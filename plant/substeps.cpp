@@ -11,6 +11,10 @@ namespace {
 constexpr double kStepsInTimeConstant = 10.0;
 // The output of the filter is exact at both ends and in the middle of a step; the machine only smooths it.
 constexpr double kStepsInFilter = 2.0;
+// Of a battery's R C: a switched inverter has the mean of the link over a step, other drives the link at its
+// start.
+constexpr double kStepsInLink = 2.0;
+constexpr double kStepsInForeseenLink = 0.75;
 constexpr double kRadPerStep = 0.2;
 // A rotor that swings carries the error of every step on: 3000 random machines on strong sources keep 1e-5.
 constexpr double kSwingRadPerStep = 0.01;
@@ -75,7 +79,8 @@ int default_substeps(const AxisParameters& p, double period_s) noexcept {
     step_s = std::min(step_s, filter_s / kStepsInFilter);
   }
   if (p.drive.bus.battery && p.drive.bus.resistance_ohm > 0.0) {
-    step_s = std::min(step_s, p.drive.bus.resistance_ohm * p.drive.bus.capacitance_f / kStepsInFilter);
+    const double steps = p.drive.kind == DriveKind::kSwitched ? kStepsInForeseenLink : kStepsInLink;
+    step_s = std::min(step_s, p.drive.bus.resistance_ohm * p.drive.bus.capacitance_f / steps);
   }
   std::visit(
       [&](const auto& machine) {

@@ -59,6 +59,8 @@ void Drive::set_parameters(const DriveParameters& p) noexcept {
   diode_v_ = kind_ == DriveKind::kSwitched ? in_series * p.inverter.diode_v : 0.0;
   switch_ohm_ = kind_ == DriveKind::kSwitched ? in_series * p.inverter.switch_ohm : 0.0;
   source_ = constants_of(p.source, connection_);
+  foresees_link_ = kind_ == DriveKind::kSwitched && p.bus.battery && p.bus.resistance_ohm > 0.0 &&
+                   filter_rate_per_s_ == 0.0;
   has_transformer_ = kind_ == DriveKind::kSource && has_transformer(p.transformer);
   transformer_ = constants_of(p.transformer);
 }
@@ -256,6 +258,7 @@ TerminalDrive Drive::bridge_output(DriveMemory& m, double start_s, double durati
   if (filter_rate_per_s_ > 0.0 && gates != Gates::kOff) filter(m, duration_s, out);
   if (order.legs_off != 0) open_legs(order.legs_off, out);
   if (holds_) hold_terminals(out);
+  if (foresees_link_) foresee_link(m, duration_s, current_a, out);
   if (field_lost_) {
     out.field_v = 0.0;
   } else if (p_.source.field_v != 0.0) {

@@ -232,6 +232,10 @@ class Drive {
                             const PhaseValues& current_a) const noexcept;
   void filter(DriveMemory& m, double duration_s, TerminalDrive& out) const noexcept;
   void open_legs(std::uint32_t legs_off, TerminalDrive& out) const noexcept;
+  /// Puts the terminals of a switched inverter on the mean of a battery's link over the interval, if the
+  /// currents stay: link and machine then agree to second order in the interval.
+  void foresee_link(const DriveMemory& m, double duration_s, const PhaseValues& current_a,
+                    TerminalDrive& out) const noexcept;
   void hold_terminals(TerminalDrive& out) const noexcept;
   void follow_start_capacitor(DriveMemory& m, double duration_s, const TerminalDrive& applied,
                               const PhaseValues& from_a, const PhaseValues& to_a) const noexcept;
@@ -261,6 +265,7 @@ class Drive {
   SourceConstants source_;
   TransformerConstants transformer_;
   bool has_transformer_;
+  bool foresees_link_;
   std::uint64_t seed_;
   std::uint64_t noise_channel_;
 

@@ -1,5 +1,7 @@
-// The state of the drive after an interval: filter, current loop and link; and the output of a shared drive.
+// The state of the drive after an interval: filter, current loop and link, which its output foresees; and the
+// output of a shared drive.
 #include <algorithm>
+#include <cmath>
 
 #include "plant/drive/drive.hpp"
 #include "plant/drive/phases.hpp"
@@ -95,8 +97,31 @@ void Drive::follow_bus(DriveMemory& m, double duration_s, const TerminalDrive& a
   m.chopper = chopper_after(p_.bus, m.bus_v, m.chopper != 0.0) ? 1.0 : 0.0;
 }
 
+void Drive::foresee_link(const DriveMemory& m, double duration_s, const PhaseValues& current_a,
+                         TerminalDrive& out) const noexcept {
+  if (m.bus_v == 0.0) return;
+  ThreePhase i = phases_of(current_a);
+  double taken_w = 0.0;
+  for (int k = 0; k < terminals_; ++k) {
+    const TerminalMode mode = out.mode[static_cast<std::size_t>(k)];
+    const double i_a = phase(i, k);
+    if (mode == TerminalMode::kDriven) taken_w += phase(out.start_v, k) * i_a;
+    if (mode == TerminalMode::kDiodes) taken_w -= out.rail_v * std::abs(i_a);
+  }
+  const ForeseenLink link =
+      foreseen_link(p_.bus, supply_v_, m.bus_v, m.chopper != 0.0, taken_w / m.bus_v, duration_s);
+  const double rail_v = rail_voltage_v(link.mean_v, connection_);
+  const auto on_rail = [=](double v) { return v > 0.0 ? rail_v : v < 0.0 ? -rail_v : 0.0; };
+  out.start_v = by_phase(on_rail, out.start_v);
+  out.rail_v = rail_v;
+  out.link_rise_v = link.end_v - link.mean_v;
+  out.link_moves = true;
+}
+
 void Drive::share_output(const TerminalDrive& out) noexcept {
   steady_output_ = out;
+  steady_output_.link_rise_v = 0.0;
+  steady_output_.link_moves = false;
   for (std::size_t k = 0; k < static_cast<std::size_t>(terminals_); ++k) {
     if (hold_[k] == Hold::kOpen) steady_output_.mode[k] = TerminalMode::kOpen;
   }

@@ -18,11 +18,13 @@ enum class TerminalMode : std::int64_t {
 /// against the middle of the DC link, those of the other connections across the winding.
 struct TerminalDrive {
   std::array<TerminalMode, 3> mode{};
-  bool constant = true;   ///< the voltages stay as they are at the start
-  ThreePhase start_v{};   ///< of driven terminals, at the start of the interval,
-  ThreePhase middle_v{};  ///< in its middle
-  ThreePhase end_v{};     ///< and at its end; the last two only if not constant
-  double rail_v = 0.0;    ///< plus and minus this are the rails
+  bool constant = true;      ///< the voltages stay as they are at the start
+  ThreePhase start_v{};      ///< of driven terminals, at the start of the interval,
+  ThreePhase middle_v{};     ///< in its middle
+  ThreePhase end_v{};        ///< and at its end; the last two only if not constant
+  double rail_v = 0.0;       ///< plus and minus this are the rails; their mean, if the link moves
+  double link_rise_v = 0.0;  ///< by which the link is above that at the end of the interval
+  bool link_moves = false;   ///< the rails are those of this interval alone
   double field_v = 0.0;
   double diode_v = 0.0;     ///< forward voltage of the diodes between a terminal and a rail
   double switch_ohm = 0.0;  ///< of the closed switches between a driven terminal and its voltage

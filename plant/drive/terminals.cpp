@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "plant/drive/phases.hpp"
+
 namespace drivebench {
 namespace {
 
@@ -265,6 +267,25 @@ PhaseValues open_terminal_voltages(Connection connection, const WindingValues& o
                                    double field_v) noexcept {
   const Phases v = winding_phases(connection, open_circuit_v);
   return {.a = v[0], .b = v[1], .c = v[2], .field = field_v};
+}
+
+ThreePhase parts_of_link(Connection connection, const ThreePhase& terminal_v, TerminalSet floating) noexcept {
+  constexpr double kMiddle = 0.5;  // between the rails
+  const auto part = [](double v) noexcept { return v > 0.0 ? 1.0 : v < 0.0 ? 0.0 : kMiddle; };
+  ThreePhase parts = by_phase(part, terminal_v);
+  const int terminals = terminal_count(connection);
+  double sum = 0.0;
+  int held = 0;
+  for (int k = 0; k < terminals; ++k) {
+    if ((floating & terminal_bit(k)) != 0) continue;
+    sum += phase(parts, k);
+    ++held;
+  }
+  const double mean = connection == Connection::kStar && held > 0 ? sum / held : kMiddle;
+  for (int k = 0; k < terminals; ++k) {
+    if ((floating & terminal_bit(k)) != 0) phase(parts, k) = mean;
+  }
+  return parts;
 }
 
 PhaseValues with_floating(Connection connection, TerminalSet floating, const PhaseValues& conducting_v,

@@ -99,6 +99,11 @@ constexpr double above_negative_rail(Connection connection, double terminal_v, d
   return connection == Connection::kStar ? terminal_v + rail_v : 0.5 * (terminal_v + rail_v);
 }
 
+/// How far each terminal, at these voltages, goes with a link that moves, against the negative rail: one at
+/// the upper rail wholly, one at the lower rail not at all, a floating one of a star as the mean of the
+/// others.
+ThreePhase parts_of_link(Connection connection, const ThreePhase& terminal_v, TerminalSet floating) noexcept;
+
 /// The terminals of an open star against the negative rail of a link: no switch holds its neutral, and the
 /// diodes hold no terminal beyond a rail and their forward voltage.
 constexpr ThreePhase within_rails(const ThreePhase& v, double link_v, double diode_v) noexcept {

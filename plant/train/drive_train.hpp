@@ -189,6 +189,11 @@ class DriveTrain final : public Train {
   void add_electrical(TerminalSet dying, const PhaseValues& current_a, const RotorMotion& motion,
                       double corner, EventValues& values) const noexcept;
   double corner_between(const RotorMotion& from, const RotorMotion& to) const noexcept;
+  /// The voltages of a shorter piece from the same start, if they depend on its length. The terminals that
+  /// conduct and the events that are looked for stay those of the whole piece: where a link that moves would
+  /// change them, so do the voltages.
+  void reconnect_piece(AxisCore& core, AxisState& state, double start_s, double duration_s, const State& x,
+                       const RotorMotion& motion) noexcept;
   void settle_terminals(const AxisCore& core, AxisState& state, State& x, const RotorMotion& motion,
                         int electrical_event) const noexcept;
   void begin_substep(const Shaft& shaft) noexcept;
@@ -222,8 +227,8 @@ class DriveTrain final : public Train {
                      const PhaseValues& current_a, const PhaseValues& voltage_v) const noexcept;
   /// A piece of known currents into GateTap::sums, the terminals' voltages aside. `halfway` is its
   /// middle_motion().
-  [[gnu::noinline]] void add_sums(const AxisCore& core, const AxisState& state, const Passed& passed,
-                                  RotorMotion halfway, const PhaseValues& from_a) const noexcept;
+  [[gnu::noinline]] void add_sums(const AxisCore& core, const Passed& passed, RotorMotion halfway,
+                                  const PhaseValues& from_a) const noexcept;
   /// Currents that have died, into GateTap::events.
   [[gnu::noinline]] void tell_deaths(const AxisCore& core, TerminalSet died, double at_s) const noexcept;
   void end_run(const AxisCore& core, AxisState& state, const State& x, const RotorMotion& motion) noexcept;

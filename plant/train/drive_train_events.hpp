@@ -67,9 +67,7 @@ auto DriveTrain<Machine, Shaft>::cut_at_event(AxisCore& core, AxisState& state, 
   const EventValues before = found_at(from, piece_.current_a);
   const Crossing crossing = located_event(before, values(to), [&](double fraction) noexcept {
     const double shorter_s = fraction * duration_s;
-    if (!piece_.circuit.constant) {  // its voltages are those of the whole piece
-      connect_piece(core, state, start_s, shorter_s, from.machine, motion_of(from));
-    }
+    reconnect_piece(core, state, start_s, shorter_s, from.machine, motion_of(from));
     to = from;
     step(core, to, shorter_s, branch, load_nm);
     return values(to);

@@ -105,7 +105,7 @@ void DriveTrain<Machine, Shaft>::finish_piece(AxisCore& core, AxisState& state,
     if (core.tap != nullptr || (core.comparators.enabled() && piece_.off != 0))
       followed.halfway = middle_motion(passed);
     if (follows_terminals) follow_terminals(core, state, passed, followed);
-    if (core.tap != nullptr) add_sums(core, state, passed, followed.halfway, from_a);
+    if (core.tap != nullptr) add_sums(core, passed, followed.halfway, from_a);
     follow_piece(core, state, start_s, duration_s, piece_.drive, piece_.circuit, before, after);
   }
   core.record({.start_s = start_s,
@@ -311,8 +311,7 @@ template <class Machine, class Shaft>
 void DriveTrain<Machine, Shaft>::shorten(AxisCore& core, AxisState& state, double start_s, double duration_s,
                                          const RotorMotion& motion) noexcept {
   piece_.stage = piece_.from;
-  if (piece_.circuit.constant) return;  // its voltages are those of any part of the piece
-  connect_piece(core, state, start_s, duration_s, piece_.from, turned(motion));
+  reconnect_piece(core, state, start_s, duration_s, piece_.from, turned(motion));
 }
 
 template <class Machine, class Shaft>

@@ -25,8 +25,8 @@ auto DriveTrain<Machine, Shaft>::instant_of(const AxisCore& core, const State& x
 }
 
 template <class Machine, class Shaft>
-void DriveTrain<Machine, Shaft>::add_sums(const AxisCore& core, const AxisState& state, const Passed& passed,
-                                          RotorMotion halfway, const PhaseValues& from_a) const noexcept {
+void DriveTrain<Machine, Shaft>::add_sums(const AxisCore& core, const Passed& passed, RotorMotion halfway,
+                                          const PhaseValues& from_a) const noexcept {
   const auto& [start_s, duration_s, from, to, from_motion, to_motion] = passed;
   const auto slope_at = [&](const State& x, const RotorMotion& motion, const TerminalInput& u) noexcept {
     return derivative(c_, x, motion,
@@ -62,8 +62,9 @@ void DriveTrain<Machine, Shaft>::add_sums(const AxisCore& core, const AxisState&
   add(sums.electrical_j, a.electrical_w, b.electrical_w, c.electrical_w);
   add(sums.copper_j, a.copper_w, b.copper_w, c.copper_w);
   add(sums.shaft_j, a.shaft_w, b.shaft_w, c.shaft_w);
-  sums.link_j += state.drive.bus_v * sixth_s * (a.link_a + 4.0 * b.link_a + c.link_a);
-  sums.link_vs += state.drive.bus_v * duration_s;
+  const double link_v = above_negative_rail(core.connection, piece_.drive.rail_v, piece_.drive.rail_v);
+  sums.link_j += link_v * sixth_s * (a.link_a + 4.0 * b.link_a + c.link_a);
+  sums.link_vs += link_v * duration_s;
 }
 
 template <class Machine, class Shaft>

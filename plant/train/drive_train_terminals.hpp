@@ -133,6 +133,21 @@ void DriveTrain<Machine, Shaft>::connect_piece(AxisCore& core, AxisState& state,
 }
 
 template <class Machine, class Shaft>
+void DriveTrain<Machine, Shaft>::reconnect_piece(AxisCore& core, AxisState& state, double start_s,
+                                                 double duration_s, const State& x,
+                                                 const RotorMotion& motion) noexcept {
+  if (piece_.circuit.constant && !piece_.drive.link_moves) return;
+  const Piece whole = piece_;
+  const TerminalSet open = state.open_terminals;
+  connect_piece(core, state, start_s, duration_s, x, motion);
+  const bool same_events = piece_.circuit.dying == whole.circuit.dying && piece_.off == whole.off &&
+                           piece_.turning_on == whole.turning_on;
+  if (same_events) return;
+  piece_ = whole;
+  state.open_terminals = open;
+}
+
+template <class Machine, class Shaft>
 PhaseValues DriveTrain<Machine, Shaft>::within_piece_v(const AxisCore& core, TerminalSet floating,
                                                        const State& x, const RotorMotion& motion,
                                                        const PhaseValues& driven_v) const noexcept {
@@ -212,8 +227,14 @@ void DriveTrain<Machine, Shaft>::follow_terminals(const AxisCore& core, AxisStat
     state.terminal_mean_v = by_phase(add, state.terminal_mean_v, against_rail(mean_v, floating));
   }
   if (core.p.sensors.terminals) {
-    state.terminal_v = against_rail(phases_of(followed.end_v),
-                                    state.open_terminals & ~driven_terminals(core.connection, piece_.drive));
+    const TerminalSet floats = state.open_terminals & ~driven_terminals(core.connection, piece_.drive);
+    state.terminal_v = against_rail(phases_of(followed.end_v), floats);
+    if (const double rise_v = piece_.drive.link_rise_v; rise_v != 0.0) {
+      state.terminal_v =
+          by_phase([=](double v, double part) { return v + part * rise_v; }, state.terminal_v,
+                   parts_of_link(core.connection, phases_of(before_switches(core.connection, followed.end_v)),
+                                 floats));
+    }
   }
   if (!core.comparators.enabled() && core.tap == nullptr) return;
   const PhaseValues half_v =
@@ -222,7 +243,7 @@ void DriveTrain<Machine, Shaft>::follow_terminals(const AxisCore& core, AxisStat
   const TerminalPath path{.start_v = against_rail(phases_of(first_v), floating),
                           .middle_v = against_rail(phases_of(half_v), floating),
                           .end_v = against_rail(phases_of(last_v), floating),
-                          .link_v = state.drive.bus_v};
+                          .link_v = above(rail_v)};
   EventLog* log = nullptr;
   if (core.tap != nullptr) {
     log = &core.tap->events;

@@ -80,6 +80,7 @@ FOUNDATIONS = {
     "server/config/words.hpp",
     "server/endpoints/deadline.hpp",
     "server/endpoints/log_limit.hpp",
+    "server/endpoints/lost_peer.hpp",
     "server/endpoints/tcp/session/context.hpp",
     "server/endpoints/tcp/session/dialogue.hpp",
     "server/endpoints/tcp/session/refusal_log.hpp",

@@ -13,6 +13,8 @@ namespace {
 
 constexpr double kSuspectPart = 0.01;  ///< of the largest signal, or of a gain: the size of a suspect
 constexpr Eigen::Index kScoreParts = 64;
+constexpr double kSeenApart =
+    0.01;  ///< of the first direction of an error: less of the second tells nothing of its own
 
 /// The suspects of each phase.
 void add_phases(const Settings& e, const PredictorRecord& record, const SensorErrors& at,
@@ -110,7 +112,9 @@ std::optional<Suspicion> strongest_suspicion(const Fit& fit, const std::vector<U
   for (const Suspect& suspect : suspects) {
     const auto count = static_cast<Eigen::Index>(suspect.errors.size());
     const auto own = directions.middleCols(first, count);
-    const Eigen::VectorXd amounts = own.colPivHouseholderQr().solve(-fit.residual);
+    Eigen::CompleteOrthogonalDecomposition<Eigen::MatrixXd> by_direction;
+    by_direction.setThreshold(kSeenApart);
+    const Eigen::VectorXd amounts = by_direction.compute(own).solve(-fit.residual);
     const Eigen::VectorXd move = moves.middleCols(first, count) * amounts;
     first += count;
     const Eigen::VectorXd error = own * amounts;

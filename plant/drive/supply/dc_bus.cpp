@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "plant/math/exponential.hpp"
+
 namespace drivebench {
 namespace {
 
@@ -50,6 +52,18 @@ BusInterval bus_after(const BusParameters& p, double supply_v, double bus_v, boo
     supplied_j = 0.5 * p.capacitance_f * (after_v - bus_v) * (after_v + bus_v) + braked_j + taken_j;
   }
   return {.voltage_v = after_v, .supplied_j = supplied_j, .braked_j = braked_j};
+}
+
+ForeseenLink foreseen_link(const BusParameters& p, double supply_v, double bus_v, bool chopper,
+                           double taken_a, double duration_s) noexcept {
+  const double supply_s = 1.0 / p.resistance_ohm;
+  const double leak_s = supply_s + (chopper ? 1.0 / p.chopper_ohm : 0.0);
+  const double rest_v = (supply_s * supply_v - taken_a) / leak_s;
+  const double x = leak_s * duration_s / p.capacitance_f;
+  // x/(1 - e^-x) = 1 + x/2 + x^2/12 - ...
+  const double mean_v = rest_v + (bus_v - rest_v) / (1.0 + x * (0.5 + x / 12.0));
+  const double end_v = rest_v + (bus_v - rest_v) * exponential(-x);
+  return {.mean_v = std::max(mean_v, 0.5 * bus_v), .end_v = std::max(end_v, 0.0)};
 }
 
 bool chopper_after(const BusParameters& p, double bus_v, bool on) noexcept {

@@ -40,6 +40,18 @@ struct BusInterval {
 BusInterval bus_after(const BusParameters& p, double supply_v, double bus_v, bool chopper, double taken_j,
                       double duration_s) noexcept;
 
+/// What a battery's link does in an interval in which its terminals take a constant current.
+struct ForeseenLink {
+  double mean_v;
+  double end_v;
+};
+
+/// `taken_a` from the positive rail, of a battery with R > 0. The mean errs by x^4/720 of the way that the
+/// link has to go, x the duration over its time constant, and is at least half of the voltage before, as in
+/// bus_after().
+ForeseenLink foreseen_link(const BusParameters& p, double supply_v, double bus_v, bool chopper,
+                           double taken_a, double duration_s) noexcept;
+
 /// Whether the brake resistor is on at this voltage, if it was on before.
 bool chopper_after(const BusParameters& p, double bus_v, bool on) noexcept;
 

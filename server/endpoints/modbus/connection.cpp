@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <string_view>
 
+#include "server/endpoints/lost_peer.hpp"
 #include "server/host/logging/log.hpp"
 
 namespace drivebench::modbus {
@@ -54,7 +55,7 @@ void ClientConnection::cut(std::string_view why) {
 
 void ClientConnection::note_loss(const boost::system::error_code& error) {
   // The kernel ends a connection whose peer acknowledges nothing, often before the timer here has begun.
-  if (open_ && error == asio::error::timed_out) cut("it took nothing for too long");
+  if (open_ && is_given_up(error)) cut("it took nothing for too long");
 }
 
 void ClientConnection::audit(std::string_view event, std::string_view why_not,

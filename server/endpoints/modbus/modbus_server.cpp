@@ -7,6 +7,7 @@
 #include <map>
 #include <stdexcept>
 
+#include "server/endpoints/lost_peer.hpp"
 #include "server/endpoints/modbus/map_info.hpp"
 #include "server/host/logging/log.hpp"
 
@@ -18,7 +19,6 @@ using asio::ip::tcp;
 // The pause after an accept that failed for lack of descriptors.
 constexpr auto kAcceptPause = std::chrono::milliseconds(100);
 // The kernel probes an idle peer every second, and ends the connection after this time without an answer.
-constexpr int kUserTimeoutMs = 3000;
 
 void tune(tcp::socket& socket) {
   using asio::detail::socket_option::integer;

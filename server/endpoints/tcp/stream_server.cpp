@@ -7,6 +7,7 @@
 #include <stdexcept>
 
 #include "server/access/address.hpp"
+#include "server/endpoints/lost_peer.hpp"
 #include "server/host/holder.hpp"
 #include "server/host/logging/log.hpp"
 
@@ -19,7 +20,6 @@ using UnixProtocol = asio::local::stream_protocol;
 // The pause after an accept that failed for lack of descriptors.
 constexpr auto kAcceptPause = std::chrono::milliseconds(100);
 // The kernel probes an idle peer every second, and ends the connection after this time without an answer.
-constexpr int kUserTimeoutMs = 3000;
 constexpr int kSendBufferBytes = 64 * 1024;
 
 tcp::endpoint endpoint_of(const TcpConfig& config) {

@@ -34,7 +34,8 @@ class BadNetwork(WireTest):
         self.addCleanup(network, "up")
 
     def test_tcp_14_a_peer_that_vanishes_ends_its_session_after_seconds(self):
-        """Catches: a session that lives on for a quarter of an hour, and an axis whose owner is dead."""
+        """Catches: a session that lives on for a quarter of an hour, an axis whose owner is dead, and an end that is told as
+        if the peer had left."""
         server = self.server(unix=True)
         here = self.client(server, unix=True)
         gone = self.client(server)
@@ -45,6 +46,8 @@ class BadNetwork(WireTest):
         self.assertRefused(here.lease(), pb.REFUSAL_OWNED)
         until(lambda: here.status().sessions == 1, "the session ends")
         self.assertDone(here.lease())
+        tcp = next(each for each in here.status().transports if each.name.startswith("tcp"))
+        self.assertEqual({count.name: count.value for count in tcp.counts}["cut"], 1)
 
     def test_tcp_21_an_outage_is_hidden_by_tcp_and_seen_by_the_watchdog(self):
         """Catches: a connection that ends with the first lost segment; an axis that goes on with old voltages."""

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <string>
 
+#include "server/endpoints/lost_peer.hpp"
+
 namespace drivebench {
 
 void Outbox::send(std::span<const std::byte> bytes, const std::shared_ptr<void>& owner) {
@@ -81,8 +83,8 @@ void Outbox::cut_deaf() {
 }
 
 void Outbox::lose(const boost::system::error_code& error) {
-  if (error != asio::error::timed_out) return close();
-  cut("its computer acknowledged nothing for 3 s");
+  if (!is_given_up(error)) return close();
+  cut("its computer acknowledged nothing for " + std::to_string(kUserTimeoutMs / 1000) + " s");
 }
 
 void Outbox::cut(std::string_view why) {

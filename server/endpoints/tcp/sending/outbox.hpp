@@ -57,8 +57,8 @@ class Outbox {
   void cut(std::string_view why);
   /// Cuts off a peer that took nothing for kNoProgressLimit.
   void cut_deaf();
-  /// Ends after an error of the socket. The kernel gives up a connection whose peer acknowledges nothing, often
-  /// before kNoProgressLimit has begun: the peer counts as cut off.
+  /// Ends after an error of the socket. The kernel gives up a connection whose peer acknowledges nothing,
+  /// often before kNoProgressLimit has begun: the peer counts as cut off.
   void lose(const boost::system::error_code& error);
   /// Shuts the socket down; queued bytes are lost.
   void close() noexcept;

@@ -46,7 +46,7 @@ struct SessionContext {
     std::uint64_t not_owner = 0;        ///< requests without the lease, which are no part of the run
     std::uint64_t excess_commands = 0;  ///< exchanges, in real time, that no tick can use
     std::uint64_t throttled = 0;        ///< pauses in serving a session
-    std::uint64_t cut = 0;              ///< sessions whose peer read nothing or was silent
+    std::uint64_t cut = 0;              ///< sessions whose peer read nothing, was silent or vanished
   } counts{};
   OctaveHistogram exchange_times{};  ///< from the arrival of commands to the answer with their samples
   CapturePool captures{};
