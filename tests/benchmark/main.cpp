@@ -5,6 +5,7 @@
 #include <array>
 #include <fstream>
 #include <nlohmann/json.hpp>
+#include <stdexcept>
 
 #include "tests/benchmark/harness/compare.hpp"
 #include "tests/benchmark/harness/machine.hpp"
@@ -70,8 +71,10 @@ std::vector<Row> measure(const std::vector<std::string>& only, int times) {
     if (!is_wanted(m, only)) continue;
     fmt::print(stderr, "measuring {}: {}\n", m.name, m.what);
     std::vector<std::vector<Row>> runs;
+    const CpuPair cpus = cpu_pair();
     for (int n = 0; n < times; ++n)
       runs.push_back(m.measure());
+    if (cpu_pair() != cpus) throw std::logic_error(fmt::format("{} leaves the program pinned", m.name));
     for (Row& row : median_of(std::move(runs)))
       rows.push_back(std::move(row));
   }

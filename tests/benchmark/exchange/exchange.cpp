@@ -90,9 +90,10 @@ struct Round {
 
 /// A controller and a server of its own that both look for the other's word before they sleep.
 Row measure_looking(const std::string& bench, PingPong& floor, CpuPair cpu) {
-  auto pinned = std::make_unique<Pinned>(cpu.far);
+  auto far = std::make_unique<Pinned>(cpu.far);
   Server server({bench, "--spin-us", "200"});
-  pinned = std::make_unique<Pinned>(cpu.near);
+  far.reset();
+  const Pinned near(cpu.near);
   Controller controller(server.address() + "?spin_us=200");
   struct Looked {
     Percentiles floor, looking;

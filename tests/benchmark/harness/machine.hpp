@@ -18,6 +18,8 @@ void check(bool good, const char* what);
 struct CpuPair {
   int near = 0;  ///< for this program: the client
   int far = 0;   ///< for the other end: the server
+
+  bool operator==(const CpuPair&) const = default;
 };
 CpuPair cpu_pair();
 
