@@ -132,7 +132,8 @@ std::vector<Row> measure_crowd() {
     auto crowd = std::make_shared<Crowd>();
     crowd->idle = idlers(place, kIdle);
     crowd->subscribers = std::make_unique<Viewers>(place, kSubscribers);
-    expect_full(place);  // before a sample is sent: a viewer that a busy machine keeps from reading is cut off
+    // Before a sample is sent: a viewer that a busy machine keeps from reading is cut off.
+    expect_full(place);
     crowd->subscribers->watch(kEighth);
     return crowd;
   });
