@@ -13,8 +13,8 @@ namespace {
 
 constexpr double kSuspectPart = 0.01;  ///< of the largest signal, or of a gain: the size of a suspect
 constexpr Eigen::Index kScoreParts = 64;
-constexpr double kSeenApart =
-    0.01;  ///< of the first direction of an error: less of the second tells nothing of its own
+/// Of the first direction of an error: less of the second tells nothing of its own.
+constexpr double kSeenApart = 0.01;
 
 /// The suspects of each phase.
 void add_phases(const Settings& e, const PredictorRecord& record, const SensorErrors& at,
