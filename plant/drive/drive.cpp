@@ -59,8 +59,7 @@ void Drive::set_parameters(const DriveParameters& p) noexcept {
   diode_v_ = kind_ == DriveKind::kSwitched ? in_series * p.inverter.diode_v : 0.0;
   switch_ohm_ = kind_ == DriveKind::kSwitched ? in_series * p.inverter.switch_ohm : 0.0;
   source_ = constants_of(p.source, connection_);
-  foresees_link_ = kind_ == DriveKind::kSwitched && p.bus.battery && p.bus.resistance_ohm > 0.0 &&
-                   filter_rate_per_s_ == 0.0;
+  foresees_link_ = kind_ == DriveKind::kSwitched && p.bus.battery && p.bus.resistance_ohm > 0.0;
   has_transformer_ = kind_ == DriveKind::kSource && has_transformer(p.transformer);
   transformer_ = constants_of(p.transformer);
 }
