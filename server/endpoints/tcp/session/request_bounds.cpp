@@ -142,6 +142,7 @@ class FrameCount {
   std::uint64_t id() const noexcept { return id_; }
   v1::Envelope::KindCase kind() const noexcept { return kind_; }          ///< the last one
   const FieldDescriptor* no_request() const noexcept { return answer_; }  ///< a kind that only servers send
+  std::size_t kinds() const noexcept { return kinds_; }                   ///< one after another
   std::size_t fields() const noexcept { return fields_; }
   std::size_t unknown() const noexcept { return unknown_; }
   /// Of the repeated field in this row of kBounds.
@@ -221,7 +222,10 @@ class FrameCount {
   /// A message between `begin` and the place that has been reached. Nothing looks into a kind that is no
   /// request.
   bool submessage(const FieldDescriptor& field, const std::byte* begin, int depth) {
-    if (depth == 0) kind_ = static_cast<v1::Envelope::KindCase>(field.number());
+    if (depth == 0 && kind_ != field.number()) {
+      kind_ = static_cast<v1::Envelope::KindCase>(field.number());
+      ++kinds_;
+    }
     if (!is_request(kind_)) answer_ = &field;
     if (answer_ != nullptr) return true;
     const std::byte* const end = at_;
@@ -238,6 +242,7 @@ class FrameCount {
   std::uint64_t id_ = 0;
   v1::Envelope::KindCase kind_ = v1::Envelope::KIND_NOT_SET;
   const FieldDescriptor* answer_ = nullptr;
+  std::size_t kinds_ = 0;
   std::size_t fields_ = 0;
   std::size_t unknown_ = 0;
   std::array<std::size_t, kBounds.size() + 1> elements_{};  // the last one: of no row
@@ -265,6 +270,7 @@ std::optional<FrameReading> problem_with(const FrameCount& count) {
     return refusal(v1::REFUSAL_OUT_OF_RANGE,
                    fmt::format("the request has {} {} but may have {}", there, what, most), field);
   };
+  if (count.kinds() > kMaxRequestKinds) return too_many(count.kinds(), "kinds", kMaxRequestKinds, "kind");
   if (count.fields() > kMaxRequestFields) {
     return too_many(count.fields(), "fields", kMaxRequestFields, "frame");
   }

@@ -135,9 +135,25 @@ TEST(RequestBounds, TCP_07_LIMIT_11_AFewUnknownFieldsAreIgnored) {
 TEST(RequestBounds, TCP_05_LIMIT_11_AFrameHasAsManyFieldsAsTheLongestRequest) {
   using fuzz::wire::repeated;
   using fuzz::wire::tagged;
-  const std::string switching = tagged(6, 2, "") + tagged(9, 2, "");  // a lease, a subscription, a lease ...
-  EXPECT_EQ(reading_of(repeated(switching, 4096)).outcome, Outcome::kRequest);
-  EXPECT_EQ(reading_of(repeated(switching, 4097)).sentence, "the request has 8194 fields but may have 8192");
+  const std::string lease = tagged(6, 2, "");
+  EXPECT_EQ(reading_of(repeated(lease, 8192)).outcome, Outcome::kRequest);
+  EXPECT_EQ(reading_of(repeated(lease, 8193)).sentence, "the request has 8193 fields but may have 8192");
+}
+
+// Catches: a frame that names a long owner and asks for the status in turn: four allocations for three
+// fields, 8,449 in all. A search found it.
+TEST(RequestBounds, TCP_05_LIMIT_11_ARequestIsOfFewKinds) {
+  using fuzz::wire::repeated;
+  using fuzz::wire::tagged;
+  const std::string cancel = tagged(28, 2, tagged(2, 2, std::string(23, 'r')));
+  const std::string switching = cancel + tagged(16, 2, "");
+  EXPECT_EQ(reading_of(repeated(switching, 4)).outcome, Outcome::kRequest);
+  EXPECT_EQ(reading_of(repeated(switching, 4)).kind, v1::Envelope::kStatusRequest);
+  const FrameReading reading = reading_of(repeated(switching, 4) + cancel);
+  EXPECT_EQ(reading.outcome, Outcome::kRefused);
+  EXPECT_EQ(reading.field, "kind");
+  EXPECT_EQ(reading.sentence, "the request has 9 kinds but may have 8");
+  EXPECT_EQ(fuzz::cost_of(repeated(switching, kMaxRequestFrame)).broken, "");
 }
 
 // Catches: a count that goes on beyond the end of a part, or takes it for another.
