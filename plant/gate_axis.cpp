@@ -54,7 +54,7 @@ GateAxis::GateAxis(const AxisParameters& p, std::int64_t period_ns, int substeps
   log_.reserve(kRoomForEvents);
   axis_.report_to(&tap_);
   clock_.hall_count = hall_.count_at(-p.sensors.hall.offset_rad / pole_pairs_, 0);
-  base_.axis = axis_.state();
+  begin_with(axis_.state());
   keep(base_);
   told_ = {.levels = axis_.state().comparators.levels, .hall_count = clock_.hall_count};
 }
@@ -82,10 +82,16 @@ void GateAxis::keep(Moment& moment) const {
   copy_but_standing(axis_.state(), moment.axis);
 }
 
+void GateAxis::begin_with(const AxisState& state) {
+  base_.axis = here_.axis = state;
+  here_.clock.at = kNowhere;
+}
+
 void GateAxis::begin_here() {
   keep(base_);
   ahead_ = 0;
   catch_up_at_ = LegTimer::kNever;
+  here_.clock.at = kNowhere;
 }
 
 void GateAxis::go_back(const AxisState& state) {
@@ -190,11 +196,16 @@ void GateAxis::add_to_cut() noexcept {
 }
 
 void GateAxis::run_to_now() {
-  const std::size_t known = log_.size();
-  go_back(base_);
-  while (clock_.at < now_) {
-    extend(now_);
-    log_.resize(known);
+  if (here_.clock.at == now_) {
+    go_back(here_);
+  } else {
+    const std::size_t known = log_.size();
+    go_back(base_);
+    while (clock_.at < now_) {
+      extend(now_);
+      log_.resize(known);
+    }
+    keep(here_);
   }
   clock_.hall_count = told_.hall_count;
   if (axis_.state().comparators.levels == told_.levels && axis_.state().comparators.edges == told_.edges)

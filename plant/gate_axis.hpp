@@ -130,6 +130,8 @@ class GateAxis {
 
   /// Where the axis is, into a moment of this axis: each piece does so, and a whole copy has 6 kB.
   void keep(Moment& moment) const;
+  /// Takes the parts of a state that keep() leaves out.
+  void begin_with(const AxisState& state);
   /// Begins at the present moment: the next piece is the first one that is looked at.
   void begin_here();
   void go_back(const Moment& moment);
@@ -165,6 +167,8 @@ class GateAxis {
   double within_tick_s(Picoseconds at) const noexcept;
   Picoseconds at_of(double within_tick_s, Picoseconds from) const noexcept;
 
+  static constexpr Picoseconds kNowhere = -1;
+
   Axis axis_;
   GateTap tap_;
   Encoder hall_;  ///< whose counts are sectors
@@ -174,6 +178,7 @@ class GateAxis {
 
   Clock clock_{};  ///< where the axis is: at the end of a piece, not before now_
   Moment base_{};  ///< where that piece, or the first one that next_edge() has looked at, began
+  Moment here_{};  ///< at now_, if run_to_now() has been there since begin_here(); else at kNowhere
   Picoseconds now_ = 0;
   std::vector<Logged> log_{};                   ///< what happens from base_ on
   std::size_t passed_ = 0;                      ///< of them, which have been handed out

@@ -53,6 +53,7 @@ bool GateAxis::restore(std::span<const std::byte> bytes,
       !is_possible_state(saved.base.axis) || !is_possible(saved))
     return false;
   base_ = saved.base;
+  begin_with(base_.axis);
   now_ = saved.now;
   told_ = saved.told;
   cut_ = saved.cut;

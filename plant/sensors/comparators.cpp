@@ -192,11 +192,10 @@ void Comparators::follow(ComparatorMemory& m, Tick tick, double start_s, double 
     double& y = filtered_v[index_of(k)];
     const double before_v = filters ? y : u.start_v;
     if (filters) input.filter(p_.rc_s, y);
-    // An RC stays between where it was and what it is given.
-    const auto [lowest_v, highest_v] = std::minmax({before_v, u.start_v, u.control_v(), u.end_v});
-    const Span span{.lowest_v = lowest_v, .highest_v = highest_v};
-    if (away_v(m, k, span) < kMostNoise * p_.noise_rms_v) {
-      switch_within(m, {k, tick, start_s, log}, input, span, duration_s);
+    const auto [lowest_v, highest_v] = std::minmax({u.start_v, u.control_v(), u.end_v});
+    const Span given{.lowest_v = lowest_v, .highest_v = highest_v};
+    if (!is_out_of_reach(away_v(m, k, given.with(before_v)))) {
+      switch_within(m, {k, tick, start_s, log}, input, given, duration_s);
     }
     y = filters ? input.at(duration_s, decay) : u.end_v;
   }
@@ -210,29 +209,34 @@ double Comparators::away_v(const ComparatorMemory& m, int terminal, const Span& 
                                           : half_v - span.highest_v - added_v;
 }
 
+bool Comparators::is_out_of_reach(double away_v) const noexcept {
+  return away_v >= kMostNoise * p_.noise_rms_v;
+}
+
 /// The noise changes at fixed instants of the tick, whatever the intervals are. Where it cannot bring the
-/// input to its threshold, only how large it is at most is asked.
-void Comparators::switch_within(ComparatorMemory& m, const Place& place, const Input& input, const Span& span,
-                                double duration_s) const noexcept {
+/// input to its threshold, only how large it is at most is asked; where none can any more, nothing is.
+void Comparators::switch_within(ComparatorMemory& m, const Place& place, const Input& input,
+                                const Span& given, double duration_s) const noexcept {
   const double added_v = offset_v(place.terminal);
   if (p_.noise_rms_v == 0.0) return switch_within(m, place, input, added_v, 0.0, duration_s);
   const auto channel = noise_channel_ + static_cast<std::uint64_t>(place.terminal);
-  const auto largest_draw = [&]() noexcept {  // of noise that reaches the threshold
-    const double sigmas = away_v(m, place.terminal, span) / p_.noise_rms_v;
-    return sigmas > 0.0 ? (1.0 + 1e-9) * exponential(-0.5 * sigmas * sigmas) : 1.0;
-  };
-  double largest = largest_draw();
   const double step_s = period_s_ / static_cast<double>(noise_steps_);
   std::int64_t step = floor_to_integer(place.start_s / step_s + 1e-9);
+  double largest = -1.0;  // draw of noise that reaches the threshold from where the input has come to
   for (double from_s = 0.0; from_s < duration_s; ++step) {
     const double to_s = std::min(duration_s, static_cast<double>(step + 1) * step_s - place.start_s);
     if (to_s <= from_s) continue;
+    if (largest < 0.0) {
+      const double missing_v = away_v(m, place.terminal, given.with(input.at(from_s)));
+      if (is_out_of_reach(missing_v)) return;
+      const double sigmas = missing_v / p_.noise_rms_v;
+      largest = sigmas > 0.0 ? (1.0 + 1e-9) * exponential(-0.5 * sigmas * sigmas) : 1.0;
+    }
     const auto number = static_cast<std::uint64_t>(place.tick * noise_steps_ + step);
     if (gaussian_draw(seed_, channel, number) <= largest) {
-      const std::uint64_t levels = m.levels;
       const double noise_v = p_.noise_rms_v * gaussian_noise(seed_, channel, number);
       switch_within(m, place, input, added_v + noise_v, from_s, to_s);
-      if (m.levels != levels) largest = largest_draw();
+      largest = -1.0;
     }
     from_s = to_s;
   }

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
 
@@ -76,16 +77,23 @@ class Comparators {
     EventLog* log;
   };
 
-  /// What the input is between.
+  /// What a voltage is between. An RC stays between where it has come to and what it is given from there on.
   struct Span {
     double lowest_v;
     double highest_v;
+
+    Span with(double v) const noexcept {
+      return {.lowest_v = std::min(lowest_v, v), .highest_v = std::max(highest_v, v)};
+    }
   };
 
   double offset_v(int terminal) const noexcept;
   /// The voltage that is missing to the threshold; negative: the input is beyond it somewhere.
   double away_v(const ComparatorMemory& m, int terminal, const Span& span) const noexcept;
-  void switch_within(ComparatorMemory& m, const Place& place, const Input& input, const Span& span,
+  /// Whether no noise brings the input over a voltage that is missing to the threshold.
+  bool is_out_of_reach(double away_v) const noexcept;
+  /// `given` is what the input before the RC is between.
+  void switch_within(ComparatorMemory& m, const Place& place, const Input& input, const Span& given,
                      double duration_s) const noexcept;
   void switch_within(ComparatorMemory& m, const Place& place, const Input& input, double added_v,
                      double from_s, double to_s) const noexcept;

@@ -86,7 +86,6 @@ void follow_piece(AxisCore& core, AxisState& state, double start_s, double durat
                   const TerminalDrive& drive, const TerminalCircuit& circuit, const Measurable& from,
                   const Measurable& to) noexcept {
   core.drive.finish(state.drive, start_s, duration_s, drive, circuit.mean_v, from.current_a, to.current_a);
-  if (core.tap != nullptr) return;  // no sample is read at gate level
   if (core.shunts.used()) {
     core.shunts.follow(state.shunts, start_s + duration_s, to.current_a, circuit.end_v);
   }

@@ -90,7 +90,6 @@ void DriveTrain<Machine, Shaft>::finish_piece(AxisCore& core, AxisState& state,
     const PhaseValues from_a = piece_.current_a;
     piece_.current_a = currents(core, state, to, to_motion);
     if (piece_.switch_ohm != 0.0) take_switch_voltages(core.connection, from_a, piece_.current_a);
-    const Measurable before = measurable(core, state, from, from_motion, from_a, piece_.circuit.start_v);
     const bool follows_terminals = core.p.sensors.follow_terminals();
     Followed followed{};
     if (follows_terminals)
@@ -98,15 +97,21 @@ void DriveTrain<Machine, Shaft>::finish_piece(AxisCore& core, AxisState& state,
     followed.end_v = core.tap != nullptr && keeps_circuit(core, state, followed.last_v)
                          ? followed.last_v
                          : end_voltages(core, state, to, to_motion);
-    const Measurable after = measurable(core, state, to, to_motion, piece_.current_a, followed.end_v);
     if (core.p.thermal.enabled) {
       state.heat_j += 0.5 * duration_s * (losses_w(c_, from, from_motion) + losses_w(c_, to, to_motion));
     }
     if (core.tap != nullptr || (core.comparators.enabled() && piece_.off != 0))
       followed.halfway = middle_motion(passed);
     if (follows_terminals) follow_terminals(core, state, passed, followed);
-    if (core.tap != nullptr) add_sums(core, passed, followed.halfway, from_a);
-    follow_piece(core, state, start_s, duration_s, piece_.drive, piece_.circuit, before, after);
+    if (core.tap != nullptr) {
+      add_sums(core, passed, followed.halfway, from_a);
+      core.drive.finish(state.drive, start_s, duration_s, piece_.drive, piece_.circuit.mean_v, from_a,
+                        piece_.current_a);
+    } else {
+      follow_piece(core, state, start_s, duration_s, piece_.drive, piece_.circuit,
+                   measurable(core, state, from, from_motion, from_a, piece_.circuit.start_v),
+                   measurable(core, state, to, to_motion, piece_.current_a, followed.end_v));
+    }
   }
   core.record({.start_s = start_s,
                .duration_s = duration_s,

@@ -87,6 +87,7 @@ TEST(GateAxis, NothingDependsOnHowTheRunIsDivided) {
   std::mt19937_64 random(3);
   std::uniform_int_distribution<Picoseconds> part(1, 40 * kMicro);
   for (int n = 0; n < kSteps; ++n) {
+    if (n % 2 == 1) parts.axis.look();
     parts.set_step(n % 6);
     const Picoseconds end = (n + 1) * kStep;
     while (parts.axis.now() < end) {
@@ -112,6 +113,17 @@ TEST(GateAxis, NothingDependsOnHowTheRunIsDivided) {
   EXPECT_EQ(a.state.shaft.angle_rad, b.state.shaft.angle_rad);
   EXPECT_EQ(a.sums.link_j, b.sums.link_j);
   EXPECT_EQ(a.sums.terminal_vs.c, b.sums.terminal_vs.c);
+}
+
+// Catches: a state that was read at an instant and is shown there again after a leg has been set.
+TEST(GateAxis, ALegThatIsSetWhereTheStateWasReadShows) {
+  Course course(turning_motor());
+  course.axis.set_leg(1, {.mode = LegMode::kLow});
+  course.axis.run(kStep, {});
+  EXPECT_EQ(course.axis.look().levels[0], LegLevel::kOff);
+  course.axis.set_leg(0, {.mode = LegMode::kHigh});
+  course.axis.next_edge(2 * kStep);
+  EXPECT_EQ(course.axis.look().levels[0], LegLevel::kHigh);
 }
 
 /// The current of the motor at each end of a PWM period, in six steps of 400 us, on so many substeps.
