@@ -2,9 +2,27 @@
 
 #include <fmt/core.h>
 
+#include <algorithm>
 #include <cmath>
+#include <cstddef>
+#include <iterator>
 
 namespace drivebench::identification {
+
+std::vector<BendingInductionModel> bending_motors(Series flux_wb, const BendingInductionModel& straight,
+                                                  double bend) {
+  constexpr double kUsual = 0.95;
+  const auto usual =
+      flux_wb.begin() + static_cast<std::ptrdiff_t>(kUsual * static_cast<double>(flux_wb.size()));
+  std::nth_element(flux_wb.begin(), usual, flux_wb.end());
+  std::vector<BendingInductionModel> motors(std::size(kBendPowers), straight);
+  for (std::size_t k = 0; k < motors.size(); ++k) {
+    motors[k].bend = bend;
+    motors[k].power = kBendPowers[k];
+    motors[k].reference_wb = *usual;
+  }
+  return motors;
+}
 
 BendTest test_bend(const Fit& fit, const std::vector<Unknown>& unknowns, const Eigen::MatrixXd& directions) {
   constexpr double k95 = 1.96;

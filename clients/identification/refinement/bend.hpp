@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "clients/identification/motors/bending_induction.hpp"
 #include "clients/identification/refinement/gauss_newton.hpp"
 #include "clients/identification/refinement/unknowns.hpp"
 
@@ -22,6 +23,11 @@ struct BendTest {
 
 /// The powers of the flux of the bends that are looked for: iron that bends early, and iron with a knee.
 inline constexpr double kBendPowers[] = {2.0, 8.0};
+
+/// A motor at the fit with a bend of each power, which grows up to the flux that 95 % of the samples do not
+/// exceed: the first samples of a run know the flux to within that of the largest current.
+std::vector<BendingInductionModel> bending_motors(Series flux_wb, const BendingInductionModel& straight,
+                                                  double bend);
 
 /// Beyond this evidence, noise in one of 1,000 records, the iron bends.
 inline constexpr double kTellsBend = 13.8;

@@ -86,23 +86,6 @@ Series magnetising_fluxes(const Predictor<InductionModel>& predictor, const Bend
   return flux_wb;
 }
 
-/// A motor at the fit with a bend of each power, which grows up to the flux that 95 % of the samples do not
-/// exceed: the first samples of a run know the flux to within that of the largest current.
-std::vector<BendingInductionModel> bending_motors(Series flux_wb, const BendingInductionModel& straight,
-                                                  double bend) {
-  constexpr double kUsual = 0.95;
-  const auto usual =
-      flux_wb.begin() + static_cast<std::ptrdiff_t>(kUsual * static_cast<double>(flux_wb.size()));
-  std::nth_element(flux_wb.begin(), usual, flux_wb.end());
-  std::vector<BendingInductionModel> motors(std::size(kBendPowers), straight);
-  for (std::size_t k = 0; k < motors.size(); ++k) {
-    motors[k].bend = bend;
-    motors[k].power = kBendPowers[k];
-    motors[k].reference_wb = *usual;
-  }
-  return motors;
-}
-
 /// What the fit of an induction motor says of its iron.
 struct Iron {
   std::optional<BendTest> bend{};  ///< of a straight motor; nothing if one with a bend leaves all bounds
