@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 #include <string>
 
 #include "clients/identification/data/noise.hpp"
@@ -63,6 +64,21 @@ std::array<double, 3> TerminalVoltages::at(std::size_t sample, double part) cons
   for (std::size_t k = 0; k < u_.size(); ++k)
     u[k] = held_ ? u_[k][sample] : value_at(u_[k], static_cast<double>(sample) + part + shift_);
   return u;
+}
+
+TerminalVoltages TerminalVoltages::thinned(std::size_t first, std::size_t by) const {
+  TerminalVoltages thin = *this;
+  if (!held_) thin.shift_ /= static_cast<double>(by);
+  for (std::size_t phase = 0; phase < u_.size(); ++phase) {
+    const SeriesView u = u_[phase];
+    thin.u_[phase].clear();
+    for (std::size_t k = first; k < u.size(); k += by) {
+      const SeriesView period = u.subspan(k, held_ ? std::min(by, u.size() - k) : 1);
+      thin.u_[phase].push_back(std::accumulate(period.begin(), period.end(), 0.0) /
+                               static_cast<double>(period.size()));
+    }
+  }
+  return thin;
 }
 
 double TerminalVoltages::rms(const SampleRange& range) const noexcept {

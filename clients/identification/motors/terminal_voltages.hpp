@@ -23,6 +23,8 @@ class TerminalVoltages {
   double rms(const SampleRange& range) const noexcept;
   /// The white part of the noisiest phase in the window, rms, without a model.
   double white_v(const SampleRange& range) const;
+  /// Those of every `by`-th sample from `first` on, with periods so many times as long.
+  TerminalVoltages thinned(std::size_t first, std::size_t by) const;
   std::size_t phases() const noexcept { return u_.size(); }
 
  private:

@@ -53,9 +53,22 @@ Vector growth_of(const Linear& l, const Matrix& inverse) {
   return (freedom * scatter.array() / variance.array() - chance2.array().sqrt()).max(1.0);
 }
 
+Matrix inverse_of(const Matrix& information) {
+  return information.llt().solve(Matrix::Identity(information.rows(), information.cols()));
+}
+
+/// The information with a part of what kOfEach or kInValleys say.
+Matrix damped_by(double part, const Matrix& information, bool valleys) {
+  Matrix damped = information;
+  if (valleys)
+    damped.diagonal() += part * inverse_of(information).diagonal().cwiseInverse();
+  else
+    damped.diagonal() *= 1.0 + part;
+  return damped;
+}
+
 Matrix covariance_of(const Linear& l) {
-  const Matrix inverse =
-      l.information.llt().solve(Matrix::Identity(l.information.rows(), l.information.cols()));
+  const Matrix inverse = inverse_of(l.information);
   const Vector growth = growth_of(l, inverse).cwiseSqrt();
   return growth.asDiagonal() * inverse * growth.asDiagonal();
 }
@@ -70,6 +83,7 @@ Fit gauss_newton(const Residuals& residuals, const Vector& start, const Steps& s
   Linear l;
   if (!residuals.values(start, l.residual)) return fit;
   fit.sum = l.residual.squaredNorm();
+  const Damping how = steps.valleys ? kInValleys : kOfEach;
   double damping = 0.0;
   Vector tried;
   double size2 = 0.0;
@@ -79,9 +93,7 @@ Fit gauss_newton(const Residuals& residuals, const Vector& start, const Steps& s
     const Vector gradient = l.jacobian.transpose() * l.residual;
     bool better = false;
     for (int attempt = 0; attempt < 8 && !better; ++attempt) {
-      Matrix damped = l.information;
-      damped.diagonal() *= 1.0 + damping;
-      Vector change = -damped.llt().solve(gradient);
+      Vector change = -damped_by(damping, l.information, steps.valleys).llt().solve(gradient);
       const double most = change.cwiseAbs().maxCoeff();
       if (!(most < std::numeric_limits<double>::infinity())) return fit;
       if (most > steps.limit) change *= steps.limit / most;
@@ -97,8 +109,8 @@ Fit gauss_newton(const Residuals& residuals, const Vector& start, const Steps& s
         }
       }
       if (size2 < small2) break;
-      damping = better ? 0.1 * damping : std::max(10.0 * damping, 1e-3);
-      if (damping < 1e-4) damping = 0.0;
+      damping = better ? how.less * damping : std::max(how.more * damping, how.first);
+      if (damping < how.less * how.first) damping = 0.0;
     }
     fit.ended = !better || size2 < small2;
   }

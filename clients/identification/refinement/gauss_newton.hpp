@@ -23,13 +23,27 @@ struct Fit {
   bool ended = false;  ///< within the most steps
 };
 
+/// The part of the information that is added to it where a step fails.
+struct Damping {
+  double first;  ///< of the first attempt that is damped
+  double more;   ///< times as much after an attempt that fails
+  double less;   ///< times as much after one that does not
+};
+/// Of each coordinate's own information, which holds if all others were known.
+inline constexpr Damping kOfEach = {.first = 1e-3, .more = 10.0, .less = 0.1};
+/// Of what a coordinate's variance leaves of that. Coordinates that are known well only together, as the
+/// inductance and the time constant of a rotor are, lie in a valley: damped by what each of them tells, steps
+/// along it end before its bottom.
+inline constexpr Damping kInValleys = {.first = 0.1, .more = 4.0, .less = 0.25};
+
 /// How a search moves.
 struct Steps {
-  double limit;         ///< of the change of a coordinate in a step
-  double near = 0.0;    ///< the derivatives stand after a step of less in every coordinate, and of less than
-                        ///< ten standard deviations
-  double small = 0.01;  ///< a step of so many standard deviations is the last
-  int most = 15;        ///< steps
+  double limit;          ///< of the change of a coordinate in a step
+  double near = 0.0;     ///< the derivatives stand after a step of less in every coordinate, and of less than
+                         ///< ten standard deviations
+  double small = 0.01;   ///< a step of so many standard deviations is the last
+  int most = 15;         ///< steps
+  bool valleys = false;  ///< damping is kInValleys, not kOfEach
   bool covariance = true;  ///< whether the fit has one; another fit that begins from it needs none
 };
 

@@ -31,7 +31,8 @@ PredictorRecord record_of(const MeasuredData& data, const Settings& e) {
   r.range.end = std::min(r.range.end, r.range.first + e.most_samples);
   const ShaftSignals shaft = shaft_signals(data, e, e.processing.shaft);
   for (std::size_t k = 0; k < r.voltages.phases(); ++k) {
-    r.currents.push_back(data.at("i_" + std::string(1, static_cast<char>('a' + k)) + "_a"));
+    const SeriesView current = data.at("i_" + std::string(1, static_cast<char>('a' + k)) + "_a");
+    r.currents.emplace_back(current.begin(), current.end());
     r.largest_current_a = std::max(r.largest_current_a, largest(r.currents.back()));
   }
   r.angle = measured_angle(data, e);
@@ -43,12 +44,30 @@ PredictorRecord record_of(const MeasuredData& data, const Settings& e) {
 
 PredictorRecord from_rest(PredictorRecord record, const MeasuredData& data, const Settings& e) {
   const ShaftSignals shaft = shaft_signals(data, e, e.processing.shaft);
-  if (!begins_at_rest(record.currents, shaft.speed)) return record;
+  const std::vector<SeriesView> currents(record.currents.begin(), record.currents.end());
+  if (!begins_at_rest(currents, shaft.speed)) return record;
   record.range.first = 0;
   record.first_speed = shaft.speed[0];
   record.from_rest = true;
   record.still = still_samples(record, e);
   return record;
+}
+
+PredictorRecord thinned(const PredictorRecord& record, std::size_t by) {
+  const auto thin = [&](const Series& x) {
+    Series kept;
+    for (std::size_t k = record.range.first; k < record.range.end; k += by)
+      kept.push_back(x[k]);
+    return kept;
+  };
+  PredictorRecord r = record;
+  r.voltages = record.voltages.thinned(record.range.first, by);
+  std::ranges::transform(record.currents, r.currents.begin(), thin);
+  r.angle = thin(record.angle);
+  r.range = {0, r.angle.size()};
+  r.period_s *= static_cast<double>(by);
+  r.still = (record.still + by - 1) / by;
+  return r;
 }
 
 SensorNoise first_noise(const PredictorRecord& r, const Settings& e) {

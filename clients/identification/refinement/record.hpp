@@ -18,9 +18,9 @@ struct SensorNoise {
 /// What the predictor needs of a record.
 struct PredictorRecord {
   TerminalVoltages voltages;
-  std::vector<SeriesView> currents;  ///< of each phase
-  Series angle;                      ///< of the shaft as measured [rad]
-  SampleRange range;                 ///< samples that are predicted
+  std::vector<Series> currents;  ///< of each phase
+  Series angle;                  ///< of the shaft as measured [rad]
+  SampleRange range;             ///< samples that are predicted
   double period_s;
   double pole_pairs;
   double first_speed;        ///< [rad/s]
@@ -38,6 +38,9 @@ PredictorRecord record_of(const MeasuredData& data, const Settings& settings);
 
 /// The same from its first sample on, if that is a motor at rest.
 PredictorRecord from_rest(PredictorRecord record, const MeasuredData& data, const Settings& settings);
+
+/// Every `by`-th sample of the range of a record.
+PredictorRecord thinned(const PredictorRecord& record, std::size_t by);
 
 /// The noises before a model has explained anything: of the currents their white part, of the angle that of
 /// its counts, of the voltages a fiftieth.

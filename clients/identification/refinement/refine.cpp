@@ -284,21 +284,34 @@ void refine_with(const PredictorRecord& record, const Settings& e, Result& resul
 
 /// The motor with a magnetising curve near a straight one that explains the record, if there is one. The
 /// straight fit does not know the largest flux of the record, which the curve must reach: points that miss it
-/// are placed anew before the last rounds.
+/// are placed anew after each round, if the iron is one there. All rounds but the last only lead to it: some
+/// thousand samples are enough.
 std::optional<Result> saturated_near(const PredictorRecord& record, const Settings& e, const Result& straight,
                                      double largest_wb) {
   constexpr double kMiss = 0.02;
-  Result rough = saturated_start(straight, largest_wb);
-  auto first = fitted<SaturatedInductionModel>(record, e, rough, {.rounds = kFirstCurveRounds});
-  if (!first.fit.found) return {};
-  first.predictor.filter(SaturatedInductionModel(first.trial, e), first.noise);
-  const double reached_wb = largest_flux_wb(first.predictor.filtered(), record);
-  const bool misses = std::abs(reached_wb / largest_wb - 1.0) > kMiss;
-  Result result = misses && magnetising_curve(first.trial).rises()
-                      ? saturated_start(straight, reached_wb, &first.trial)
-                      : saturated_start(straight, largest_wb);
-  const Begin there = {.near = &first.trial, .noise = first.noise, .rounds = kCurveRounds};
-  auto last = fitted<SaturatedInductionModel>(record, e, result, there, std::move(first.predictor));
+  constexpr std::size_t kRoughSamples = 5000;
+  const std::size_t by = std::max<std::size_t>(1, record.range.count() / kRoughSamples);
+  const PredictorRecord thin = thinned(record, by);
+  Result result = saturated_start(straight, largest_wb);
+  Result near;
+  Begin begin;
+  std::optional<Predictor<SaturatedInductionModel>> predictor;
+  for (int round = 0; round < kLastCurveRound.first; ++round) {
+    begin.rounds = {.first = round, .end = round + 1, .fine = kLastCurveRound.fine};
+    auto rough = fitted<SaturatedInductionModel>(thin, e, result, begin, std::move(predictor));
+    if (!rough.fit.found) return {};
+    rough.predictor.filter(SaturatedInductionModel(rough.trial, e), rough.noise);
+    const double reached_wb = largest_flux_wb(rough.predictor.filtered(), thin);
+    Result there = begun(saturated_start(straight, reached_wb, &rough.trial), rough.trial);
+    if (std::abs(reached_wb / result.curve_wb.back() - 1.0) > kMiss && magnetising_curve(there).rises())
+      result = std::move(there);
+    near = std::move(rough.trial);
+    predictor.emplace(std::move(rough.predictor));
+    begin = {.near = &near, .noise = rough.noise};
+  }
+  begin.noise->voltage_v *= std::sqrt(static_cast<double>(by));  // the mean of so many has less
+  begin.rounds = kLastCurveRound;
+  auto last = fitted<SaturatedInductionModel>(record, e, result, begin);
   if (!last.fit.found) return {};
   judge(record, e, last, {}, result);
   if (!result.explanation->holds) return {};

@@ -19,10 +19,8 @@ struct Rounds {
   int fine;  ///< from this one on; after it a fit ends once the noises stand
 };
 inline constexpr Rounds kRounds = {.first = 0, .end = 2, .fine = 1};
-inline constexpr Rounds kNearRounds = {.first = 1, .end = 2, .fine = 1};  ///< near a fit, with its noises
-/// Of a motor with a magnetising curve, until its largest flux is known, and from there on.
-inline constexpr Rounds kFirstCurveRounds = {.first = 0, .end = 2, .fine = 2};
-inline constexpr Rounds kCurveRounds = {.first = 2, .end = 4, .fine = 2};
+inline constexpr Rounds kNearRounds = {.first = 1, .end = 2, .fine = 1};      ///< near a fit, with its noises
+inline constexpr Rounds kLastCurveRound = {.first = 3, .end = 4, .fine = 3};  ///< of a magnetising curve
 inline constexpr double kHopeless =
     25.0;  ///< mean square of the first round's innovations, where 1 is expected
 inline constexpr double kNearStep = 0.03;      ///< in which derivatives stand
@@ -30,7 +28,6 @@ inline constexpr double kRoughly = 0.1;        ///< of a standard deviation: wha
 inline constexpr double kFinely = 0.01;        ///< what the last one leaves
 inline constexpr double kLargestChange = 0.7;  ///< of a logarithm in a step
 inline constexpr int kMostSteps = 15;          ///< of a round
-inline constexpr int kMostFirstSteps = 8;      ///< of the first round of a curve, which takes 2 to 6
 
 /// The noises of voltages and currents that make the likelihood of so many samples greatest, each to a fifth.
 template <class Model>
@@ -176,7 +173,8 @@ Fit fit_in_rounds(const PredictorRecord& record, const Settings& e, Predictor<Mo
                        {.limit = kLargestChange,
                         .near = kNearStep,
                         .small = fine ? kFinely : kRoughly,
-                        .most = curved && round == 0 ? kMostFirstSteps : kMostSteps,
+                        .most = kMostSteps,
+                        .valleys = curved,
                         .covariance = fine});
     if (round == 0 && fit.sum > kHopeless * static_cast<double>(predictor.rows())) fit.found = false;
     if (round == 0 && curved && !fit.ended) fit.found = false;

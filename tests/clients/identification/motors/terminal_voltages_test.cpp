@@ -40,5 +40,14 @@ TEST(TerminalVoltages, AnInstantaneousValueRunsThroughACubic) {
   EXPECT_NEAR(voltages(data, 0.2).at(50, 0.5)[0], std::cos(0.314 * 50.7), 5e-4);
 }
 
+// Every fourth sample from the third on: a held voltage is the mean of its four periods, one at an instant is
+// that of the same instant. Catches: the first of the four periods for all of them, which is 1.5 periods
+// late; a shift in periods of the whole record.
+TEST(TerminalVoltages, ThinnedVoltagesKeepTheirMeanAndTheirInstant) {
+  const MeasuredData data = record([](int k) { return static_cast<double>(k); });
+  EXPECT_DOUBLE_EQ(voltages(data, -0.5).thinned(3, 4).at(2, 0.5)[0], 11.0 + 1.5);
+  EXPECT_NEAR(voltages(data, 0.2).thinned(3, 4).at(2, 0.5)[0], 11.0 + 2.0 + 0.2, 1e-12);
+}
+
 }  // namespace
 }  // namespace drivebench::identification

@@ -89,5 +89,30 @@ TEST(GaussNewton, ADirectionThatNothingShowsIsUnknown) {
   EXPECT_NEAR(fit.at(0), 1.0, 0.5);
 }
 
+// Coordinates that are known 100 times as well together as each of them: a valley along b = a^2, which bends
+// so much that a whole step climbs its side. Catches: a damping that holds them by what each of them tells:
+// steps become so short that the search ends at a = 0.34, 0.66 standard deviations from the bottom.
+TEST(GaussNewton, ASearchEndsAtTheBottomOfAValley) {
+  constexpr double kSide = 100.0;
+  const Residuals residuals{.values =
+                                [&](const Eigen::VectorXd& z, Eigen::VectorXd& out) {
+                                  out.resize(2);
+                                  out << kSide * (z(1) - z(0) * z(0)), z(0) - 1.0;
+                                  return true;
+                                },
+                            .derivatives =
+                                [&](const Eigen::VectorXd& z, Eigen::MatrixXd& out) {
+                                  out.resize(2, 2);
+                                  out << -2.0 * kSide * z(0), kSide, 1.0, 0.0;
+                                  return true;
+                                }};
+  const Eigen::VectorXd start{{0.2, 0.04}};
+  const Fit fit =
+      gauss_newton(residuals, start, {.limit = 0.7, .most = 60, .valleys = true, .covariance = false});
+  EXPECT_TRUE(fit.ended);
+  EXPECT_NEAR(fit.at(0), 1.0, 0.01);
+  EXPECT_NEAR(fit.at(1), 1.0, 0.02);
+}
+
 }  // namespace
 }  // namespace drivebench::identification

@@ -54,6 +54,22 @@ void expect_small(const std::vector<double>& errors) {
     EXPECT_LT(errors[k], kMost) << "unknown " << k;
 }
 
+// Catches: samples that are counted from the begin of the record and not of its range, a period that stays
+// that of the record, a first count that ends four times as late.
+TEST(Predictor, AThinnedRecordHasEveryFourthSample) {
+  const Recorded run = record_motor(motor_draws()[1], 1, 1);
+  PredictorRecord record = record_of(run.data, run.how);
+  record.still = 5;
+  const PredictorRecord thin = thinned(record, 4);
+  ASSERT_GT(record.range.first, 0U);
+  EXPECT_EQ(thin.range.count(), (record.range.count() + 3) / 4);
+  EXPECT_DOUBLE_EQ(thin.period_s, 4.0 * record.period_s);
+  EXPECT_EQ(thin.still, 2U);
+  EXPECT_EQ(thin.angle[thin.range.first + 10], record.angle[record.range.first + 40]);
+  EXPECT_EQ(thin.currents[0][thin.range.first + 10], record.currents[0][record.range.first + 40]);
+  EXPECT_EQ(thin.voltages.at(thin.range.first + 10, 0.0), record.voltages.at(record.range.first + 40, 0.0));
+}
+
 // Of every parameter of every kind of motor, and of every error of its sensors. Catches: a column that
 // forgets what the innovations do to the state, an offset or a gain of the voltages with the other sign, a
 // frame that does not turn with the encoder's zero, a first state that moves with nothing.
