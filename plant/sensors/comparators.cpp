@@ -210,11 +210,11 @@ double Comparators::away_v(const ComparatorMemory& m, int terminal, const Span& 
 }
 
 bool Comparators::is_out_of_reach(double away_v) const noexcept {
-  return away_v >= kMostNoise * p_.noise_rms_v;
+  return !(away_v < kMostNoise * p_.noise_rms_v);
 }
 
 /// The noise changes at fixed instants of the tick, whatever the intervals are. Where it cannot bring the
-/// input to its threshold, only how large it is at most is asked; where none can any more, nothing is.
+/// input to its threshold, only how large it is at most is asked; once none can, the rest is skipped.
 void Comparators::switch_within(ComparatorMemory& m, const Place& place, const Input& input,
                                 const Span& given, double duration_s) const noexcept {
   const double added_v = offset_v(place.terminal);

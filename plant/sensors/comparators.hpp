@@ -90,7 +90,7 @@ class Comparators {
   double offset_v(int terminal) const noexcept;
   /// The voltage that is missing to the threshold; negative: the input is beyond it somewhere.
   double away_v(const ComparatorMemory& m, int terminal, const Span& span) const noexcept;
-  /// Whether no noise brings the input over a voltage that is missing to the threshold.
+  /// Whether the voltage that is missing to the threshold is more than any noise.
   bool is_out_of_reach(double away_v) const noexcept;
   /// `given` is what the input before the RC is between.
   void switch_within(ComparatorMemory& m, const Place& place, const Input& input, const Span& given,

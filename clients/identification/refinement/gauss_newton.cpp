@@ -57,7 +57,7 @@ Matrix inverse_of(const Matrix& information) {
   return information.llt().solve(Matrix::Identity(information.rows(), information.cols()));
 }
 
-/// The information with a part of what kOfEach or kInValleys say.
+/// The information, and a part of that of each coordinate alone; in valleys of its 1/variance.
 Matrix damped_by(double part, const Matrix& information, bool valleys) {
   Matrix damped = information;
   if (valleys)

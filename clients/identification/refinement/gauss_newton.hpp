@@ -31,9 +31,9 @@ struct Damping {
 };
 /// Of each coordinate's own information, which holds if all others were known.
 inline constexpr Damping kOfEach = {.first = 1e-3, .more = 10.0, .less = 0.1};
-/// Of what a coordinate's variance leaves of that. Coordinates that are known well only together, as the
-/// inductance and the time constant of a rotor are, lie in a valley: damped by what each of them tells, steps
-/// along it end before its bottom.
+/// Of 1/variance of each coordinate, its information if no other were known. Coordinates that are known well
+/// only together, as the inductance and the time constant of a rotor are, lie in a valley: damped by what
+/// each of them tells, steps along it end before its bottom.
 inline constexpr Damping kInValleys = {.first = 0.1, .more = 4.0, .less = 0.25};
 
 /// How a search moves.

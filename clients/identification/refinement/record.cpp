@@ -70,6 +70,15 @@ PredictorRecord thinned(const PredictorRecord& record, std::size_t by) {
   return r;
 }
 
+std::size_t rough_step(const PredictorRecord& record) {
+  constexpr std::size_t kRoughSamples = 5000;
+  constexpr double kLongestPeriod_s = 0.25e-3;
+  constexpr double kMostTurn_rad = 0.3;
+  const double speed = std::max(record.pole_pairs * record.largest_speed, kMostTurn_rad / kLongestPeriod_s);
+  const auto most = static_cast<std::size_t>(kMostTurn_rad / (speed * record.period_s) * (1.0 + 1e-9));
+  return std::clamp<std::size_t>(record.range.count() / kRoughSamples, 1, std::max<std::size_t>(most, 1));
+}
+
 SensorNoise first_noise(const PredictorRecord& r, const Settings& e) {
   constexpr double kFirstVoltage = 0.02;  // of the rms voltage: what the first round allows
   SensorNoise noise{.voltage_v = kFirstVoltage * r.voltages.rms(r.range), .current_a = 0.0, .angle_rad = 0.0};

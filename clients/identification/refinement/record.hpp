@@ -42,6 +42,10 @@ PredictorRecord from_rest(PredictorRecord record, const MeasuredData& data, cons
 /// Every `by`-th sample of the range of a record.
 PredictorRecord thinned(const PredictorRecord& record, std::size_t by);
 
+/// Every how many-th sample is enough for a rough fit: some thousand, not so far apart that the currents of
+/// line or rotor turn much between them.
+std::size_t rough_step(const PredictorRecord& record);
+
 /// The noises before a model has explained anything: of the currents their white part, of the angle that of
 /// its counts, of the voltages a fiftieth.
 SensorNoise first_noise(const PredictorRecord& record, const Settings& settings);

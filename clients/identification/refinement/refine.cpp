@@ -284,13 +284,12 @@ void refine_with(const PredictorRecord& record, const Settings& e, Result& resul
 
 /// The motor with a magnetising curve near a straight one that explains the record, if there is one. The
 /// straight fit does not know the largest flux of the record, which the curve must reach: points that miss it
-/// are placed anew after each round, if the iron is one there. All rounds but the last only lead to it: some
-/// thousand samples are enough.
+/// are placed anew after each round, if the iron is one there. All rounds but the last only lead to it, on
+/// fewer samples.
 std::optional<Result> saturated_near(const PredictorRecord& record, const Settings& e, const Result& straight,
                                      double largest_wb) {
   constexpr double kMiss = 0.02;
-  constexpr std::size_t kRoughSamples = 5000;
-  const std::size_t by = std::max<std::size_t>(1, record.range.count() / kRoughSamples);
+  const std::size_t by = rough_step(record);
   const PredictorRecord thin = thinned(record, by);
   Result result = saturated_start(straight, largest_wb);
   Result near;
@@ -298,7 +297,8 @@ std::optional<Result> saturated_near(const PredictorRecord& record, const Settin
   std::optional<Predictor<SaturatedInductionModel>> predictor;
   for (int round = 0; round < kLastCurveRound.first; ++round) {
     begin.rounds = {.first = round, .end = round + 1, .fine = kLastCurveRound.fine};
-    auto rough = fitted<SaturatedInductionModel>(thin, e, result, begin, std::move(predictor));
+    auto rough =
+        fitted<SaturatedInductionModel>(thin, e, result, begin, std::exchange(predictor, std::nullopt));
     if (!rough.fit.found) return {};
     rough.predictor.filter(SaturatedInductionModel(rough.trial, e), rough.noise);
     const double reached_wb = largest_flux_wb(rough.predictor.filtered(), thin);
@@ -309,7 +309,7 @@ std::optional<Result> saturated_near(const PredictorRecord& record, const Settin
     predictor.emplace(std::move(rough.predictor));
     begin = {.near = &near, .noise = rough.noise};
   }
-  begin.noise->voltage_v *= std::sqrt(static_cast<double>(by));  // the mean of so many has less
+  begin.noise->voltage_v *= std::sqrt(static_cast<double>(by));  // periods that are held: a mean has less
   begin.rounds = kLastCurveRound;
   auto last = fitted<SaturatedInductionModel>(record, e, result, begin);
   if (!last.fit.found) return {};

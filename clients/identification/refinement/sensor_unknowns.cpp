@@ -26,24 +26,24 @@ bool is_sensor(const Estimate& e) {
 
 void add_sensors(const Settings& e, const PredictorRecord& record, Result& result,
                  std::vector<Unknown>& unknowns) {
+  const auto add = [&](Estimate error, double scale) {
+    unknowns.push_back({.name = error.name, .scale = scale});
+    if (result.find(error.name) == nullptr) result.parameters.push_back(std::move(error));
+  };
   const std::size_t phases = record.currents.size();
   for (const bool current : {true, false}) {
     const double largest = current ? record.largest_current_a : record.voltages.rms(record.range);
     const bool offsets = current ? e.sensors.current_offsets : e.sensors.voltage_offsets;
     for (std::size_t phase = !current && phases == 3 ? 1 : 0; phase < phases && offsets; ++phase) {
       const std::string name = column_of(current, phase) + " offset";
-      result.parameters.push_back({.name = name, .unit = current ? "A" : "V", .truth = {}});
-      unknowns.push_back({.name = name, .scale = kOffset * largest});
+      add({.name = name, .unit = current ? "A" : "V", .truth = {}}, kOffset * largest);
     }
     for (std::size_t phase = 1; phase < phases && e.sensors.gains; ++phase) {
       const std::string name = column_of(current, phase) + " gain";
-      result.parameters.push_back({.name = name, .unit = "1", .value = 1.0, .truth = {}});
-      unknowns.push_back({.name = name});
+      add({.name = name, .unit = "1", .value = 1.0, .truth = {}}, 0.0);
     }
   }
-  if (!e.sensors.zero) return;
-  result.parameters.push_back({.name = kZero, .unit = "rad electrical", .truth = {}});
-  unknowns.push_back({.name = kZero, .scale = kZeroScale_rad});
+  if (e.sensors.zero) add({.name = kZero, .unit = "rad electrical", .truth = {}}, kZeroScale_rad);
 }
 
 SensorErrors errors_of(const Result& result) {

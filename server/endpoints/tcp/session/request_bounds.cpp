@@ -142,9 +142,9 @@ class FrameCount {
   std::uint64_t id() const noexcept { return id_; }
   v1::Envelope::KindCase kind() const noexcept { return kind_; }          ///< the last one
   const FieldDescriptor* no_request() const noexcept { return answer_; }  ///< a kind that only servers send
-  std::size_t kinds() const noexcept { return kinds_; }                   ///< one after another
   std::size_t fields() const noexcept { return fields_; }
   std::size_t unknown() const noexcept { return unknown_; }
+  std::size_t replaced() const noexcept { return replaced_; }  ///< members of a oneof, by others of it
   /// Of the repeated field in this row of kBounds.
   std::size_t elements(std::size_t bound) const noexcept { return elements_[bound]; }
 
@@ -168,6 +168,7 @@ class FrameCount {
   /// The fields up to `end`, or to the end of this group. No type: they are unknown.
   bool message(const Descriptor* type, const std::byte* end, int depth, std::uint32_t group = 0) {
     if (depth > kMaxRequestNesting) return false;
+    const FieldDescriptor* chosen = nullptr;  // of the oneof
     while (at_ != end) {
       std::uint64_t tag = 0;
       if (!varint(end, tag) || tag > 0xFFFFFFFF || tag >> 3 == 0) return false;
@@ -180,6 +181,9 @@ class FrameCount {
       const FieldDescriptor* const field =
           is_known ? type->FindFieldByNumber(static_cast<int>(number)) : nullptr;
       if (!one_field(field, number, wire, end, depth)) return false;
+      if (field == nullptr || field->real_containing_oneof() == nullptr) continue;
+      if (chosen != nullptr && chosen != field) ++replaced_;
+      chosen = field;
     }
     return group == 0;
   }
@@ -222,10 +226,7 @@ class FrameCount {
   /// A message between `begin` and the place that has been reached. Nothing looks into a kind that is no
   /// request.
   bool submessage(const FieldDescriptor& field, const std::byte* begin, int depth) {
-    if (depth == 0 && kind_ != field.number()) {
-      kind_ = static_cast<v1::Envelope::KindCase>(field.number());
-      ++kinds_;
-    }
+    if (depth == 0) kind_ = static_cast<v1::Envelope::KindCase>(field.number());
     if (!is_request(kind_)) answer_ = &field;
     if (answer_ != nullptr) return true;
     const std::byte* const end = at_;
@@ -242,9 +243,9 @@ class FrameCount {
   std::uint64_t id_ = 0;
   v1::Envelope::KindCase kind_ = v1::Envelope::KIND_NOT_SET;
   const FieldDescriptor* answer_ = nullptr;
-  std::size_t kinds_ = 0;
   std::size_t fields_ = 0;
   std::size_t unknown_ = 0;
+  std::size_t replaced_ = 0;
   std::array<std::size_t, kBounds.size() + 1> elements_{};  // the last one: of no row
   bool is_envelope_;
 };
@@ -270,7 +271,9 @@ std::optional<FrameReading> problem_with(const FrameCount& count) {
     return refusal(v1::REFUSAL_OUT_OF_RANGE,
                    fmt::format("the request has {} {} but may have {}", there, what, most), field);
   };
-  if (count.kinds() > kMaxRequestKinds) return too_many(count.kinds(), "kinds", kMaxRequestKinds, "kind");
+  if (count.replaced() > kMaxReplacedFields) {
+    return too_many(count.replaced(), "fields that others take the place of", kMaxReplacedFields, "frame");
+  }
   if (count.fields() > kMaxRequestFields) {
     return too_many(count.fields(), "fields", kMaxRequestFields, "frame");
   }

@@ -14,9 +14,9 @@ namespace drivebench {
 inline constexpr std::size_t kMaxRequestFields = 8192;
 /// The most fields among them that this server does not know: those of newer clients.
 inline constexpr std::size_t kMaxUnknownFields = 64;
-/// The most kinds of an envelope, of which the last one counts. Each throws away what was made of the one
-/// before it, so that a frame that goes to and fro costs more allocations than it has fields.
-inline constexpr std::size_t kMaxRequestKinds = 8;
+/// The most members of a oneof that others take the place of, which no client writes: each is made and thrown
+/// away, so that a frame that goes to and fro costs more allocations than it has fields.
+inline constexpr std::size_t kMaxReplacedFields = 8;
 /// The deepest nesting of messages and groups.
 inline constexpr int kMaxRequestNesting = 16;
 

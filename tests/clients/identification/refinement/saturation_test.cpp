@@ -91,6 +91,23 @@ TEST(Saturation, TheCurveEndsAtTheLargestFlux) {
   }
 }
 
+// A current transducer of phase a adds 20 mA. Catches: an error of a sensor that each round of the curve's
+// fit adds once more, of which the last one is stated: 0 with an interval of 0.
+TEST(Saturation, ASensorHasOneErrorHoweverManyRounds) {
+  Saturated c(1);
+  for (Column& column : c.run.data.columns) {
+    if (column.name != "i_a_a") continue;
+    for (double& i : column.values)
+      i += 0.02;
+  }
+  c.run.how.sensors.current_offsets = true;
+  const Result r = identify(c.run.data, c.run.how);
+  ASSERT_TRUE(r.excitation.sufficient) << to_markdown(r);
+  EXPECT_EQ(r.kind, "saturated_induction");
+  ASSERT_EQ(r.sensors.size(), 3U) << to_markdown(r);
+  EXPECT_NEAR(r.sensors.front().value, 0.02, r.sensors.front().interval.value_or(0.0)) << to_markdown(r);
+}
+
 // At rest the encoder shows one count for many samples, 0.4 counts from the shaft. Catches: that error as
 // noise, new in every sample: J and tau_L then lie at 2.1 of their intervals, in every noise.
 TEST(Saturation, TheFirstCountOfAMotorAtRestIsOneError) {

@@ -141,19 +141,27 @@ TEST(RequestBounds, TCP_05_LIMIT_11_AFrameHasAsManyFieldsAsTheLongestRequest) {
 }
 
 // Catches: a frame that names a long owner and asks for the status in turn: four allocations for three
-// fields, 8,449 in all. A search found it.
-TEST(RequestBounds, TCP_05_LIMIT_11_ARequestIsOfFewKinds) {
+// fields, 8,449 in all, which a search found; an event or a shape that does the same within a request.
+TEST(RequestBounds, TCP_05_LIMIT_11_FewMembersOfAOneofAreReplaced) {
   using fuzz::wire::repeated;
   using fuzz::wire::tagged;
   const std::string cancel = tagged(28, 2, tagged(2, 2, std::string(23, 'r')));
   const std::string switching = cancel + tagged(16, 2, "");
-  EXPECT_EQ(reading_of(repeated(switching, 4)).outcome, Outcome::kRequest);
+  EXPECT_EQ(reading_of(repeated(switching, 4) + cancel).outcome, Outcome::kRequest);
   EXPECT_EQ(reading_of(repeated(switching, 4)).kind, v1::Envelope::kStatusRequest);
-  const FrameReading reading = reading_of(repeated(switching, 4) + cancel);
+  const FrameReading reading = reading_of(repeated(switching, 5));
   EXPECT_EQ(reading.outcome, Outcome::kRefused);
-  EXPECT_EQ(reading.field, "kind");
-  EXPECT_EQ(reading.sentence, "the request has 9 kinds but may have 8");
-  EXPECT_EQ(fuzz::cost_of(repeated(switching, kMaxRequestFrame)).broken, "");
+  EXPECT_EQ(reading.field, "frame");
+  EXPECT_EQ(reading.sentence, "the request has 9 fields that others take the place of but may have 8");
+  const std::string name = tagged(1, 2, std::string(16, 'n'));
+  const std::string event = repeated(tagged(6, 2, name) + tagged(7, 2, name), 1600);
+  const std::string shape =
+      repeated(tagged(11, 2, tagged(3, 2, std::string(16, 'f'))) + tagged(4, 2, ""), 2000);
+  for (const std::string& frame : {repeated(switching, kMaxRequestFrame), many(20, 15, event, 1),
+                                   many(20, 14, tagged(4, 2, shape), 1)}) {
+    EXPECT_EQ(reading_of(frame).outcome, Outcome::kRefused);
+    EXPECT_EQ(fuzz::cost_of(frame).broken, "");
+  }
 }
 
 // Catches: a count that goes on beyond the end of a part, or takes it for another.
