@@ -3,6 +3,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <span>
 
 #include "plant/axis_parameters.hpp"
@@ -50,9 +51,9 @@ class Axis {
   // command is in force: open_tick(), run_part() from its start to its end, close_tick().
 
   void open_tick(Tick tick) noexcept;
-  /// From start_s to end_s within the tick, at most a step. Whether the state is finite; if not, the axis
-  /// stands where it was and has the fault `diverged`.
-  bool run_part(const LegLevels& levels, double start_s, double end_s) noexcept;
+  /// From start_s to end_s within the tick, at most a step. The currents of the terminals at its end; none
+  /// if the state is not finite: the axis then stands where it was and has the fault `diverged`.
+  std::optional<PhaseValues> run_part(const LegLevels& levels, double start_s, double end_s) noexcept;
   void close_tick() noexcept;
   /// Back to a state that was kept within this tick or one before it, opened and not closed.
   void go_back(const AxisState& state, Tick tick) noexcept;

@@ -9,19 +9,19 @@ void Axis::open_tick(Tick tick) noexcept {
   core_.follows = true;  // every piece reports
 }
 
-bool Axis::run_part(const LegLevels& levels, double start_s, double end_s) noexcept {
+std::optional<PhaseValues> Axis::run_part(const LegLevels& levels, double start_s, double end_s) noexcept {
   const MotionState before = motion();
   core_.segment_count = 0;
   core_.drive.hold_legs(state_.drive, levels);
   const PhaseValues end_a = train_->run_part(core_, state_, start_s, end_s, load_at(core_.tick));
   if (!finite()) {
     hold(before);
-    return false;
+    return std::nullopt;
   }
   check_over_current(core_, state_, end_a);
   // Of the sensors of the position only the count is read.
   core_.encoder.count(state_.encoder, last_tick(), core_.tick, core_.last_tick_turn, state_.injected);
-  return true;
+  return end_a;
 }
 
 void Axis::close_tick() noexcept {

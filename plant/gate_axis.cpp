@@ -34,6 +34,11 @@ void copy_but_standing(const AxisState& from, AxisState& to) noexcept {
 /// next_edge() and what base_ is behind now by [pieces].
 constexpr std::size_t kMostBehind = 16;
 
+/// Whether an open switch beside a conducting diode is as good as a closed one.
+bool joins_legs(const AxisParameters& p) {
+  return !has_switch_losses(p.drive) && p.drive.inverter.bootstrap_s == 0.0;
+}
+
 double pole_pairs_of_machine(const AxisParameters& p) {
   return std::visit([](const auto& machine) { return pole_pairs_of(machine); }, p.machine);
 }
@@ -48,6 +53,7 @@ GateAxis::GateAxis(const AxisParameters& p, std::int64_t period_ns, int substeps
              .half_count_offset = true},
             1e-9 * static_cast<double>(period_ns)),
       pole_pairs_(pole_pairs_of_machine(p)),
+      may_join_(joins_legs(p)),
       period_(1000 * period_ns),
       substeps_(substeps) {
   constexpr std::size_t kRoomForEvents = 1024;
@@ -59,23 +65,6 @@ GateAxis::GateAxis(const AxisParameters& p, std::int64_t period_ns, int substeps
   told_ = {.levels = axis_.state().comparators.levels, .hall_count = clock_.hall_count};
 }
 
-double GateAxis::within_tick_s(Picoseconds at) const noexcept {
-  return 1e-12 * static_cast<double>(at - tick() * period_);
-}
-
-Picoseconds GateAxis::at_of(double within_tick_s, Picoseconds from) const noexcept {
-  return std::max(from, tick() * period_ + static_cast<Picoseconds>(std::llround(1e12 * within_tick_s)));
-}
-
-Picoseconds GateAxis::grid_after(Picoseconds at) const noexcept {
-  const Picoseconds start = at / period_ * period_;
-  const Picoseconds step = (at - start) * substeps_ / period_;
-  for (Picoseconds n = step;; ++n) {
-    const Picoseconds grid = start + n * period_ / substeps_;
-    if (grid > at) return grid;
-  }
-}
-
 void GateAxis::keep(Moment& moment) const {
   moment.clock = clock_;
   moment.sums = tap_.sums;
@@ -83,7 +72,7 @@ void GateAxis::keep(Moment& moment) const {
 }
 
 void GateAxis::begin_with(const AxisState& state) {
-  base_.axis = here_.axis = state;
+  base_.axis = here_.axis = unjoined_.axis = state;
   here_.clock.at = kNowhere;
 }
 
@@ -106,29 +95,6 @@ void GateAxis::go_back(const Moment& moment) {
   clock_ = moment.clock;
   tap_.sums = moment.sums;
   go_back(moment.axis);
-}
-
-void GateAxis::extend(Picoseconds limit) {
-  const Picoseconds from = clock_.at;
-  if (clock_.tick_open == 0) axis_.open_tick(tick());
-  clock_.tick_open = 1;
-  Picoseconds to = std::min(limit, grid_after(from));
-  LegLevels levels{};
-  for (std::size_t k = 0; k < levels.size(); ++k) {
-    clock_.legs[k].go_to(from);
-    levels[k] = clock_.legs[k].level();
-    to = std::min(to, clock_.legs[k].next(from));
-  }
-  tap_.events.clear();
-  const bool is_held = clock_.diverged_from != LegTimer::kNever;
-  if (!is_held && axis_.run_part(levels, within_tick_s(from), within_tick_s(to))) log_events(from);
-  const bool ends_tick = to == (tick() + 1) * period_;
-  clock_.at = to;
-  if (ends_tick) {
-    if (!is_held && (axis_.state().faults & kDiverged) == 0) axis_.close_tick();
-    clock_.tick_open = 0;
-  }
-  if (!is_held && (axis_.state().faults & kDiverged) != 0) clock_.diverged_from = from;
 }
 
 void GateAxis::log_events(Picoseconds from) {
@@ -278,6 +244,7 @@ void GateAxis::set_load(double load_nm) {
 void GateAxis::set_parameters(const AxisParameters& p) {
   stop_here();
   axis_.set_parameters(with_terminals(p));
+  may_join_ = joins_legs(p);
   if (clock_.tick_open != 0) axis_.take_changes(tick());
   keep(base_);
 }

@@ -94,6 +94,7 @@ class GateAxis {
     std::int64_t hall_count = 0;                   ///< sectors of 60 electrical degrees
     Picoseconds diverged_from = LegTimer::kNever;  ///< the start of the piece in which the machine has
     std::array<LegTimer, 3> legs{};
+    std::array<std::int64_t, 3> flow{};  ///< signs of the terminals' currents
   };
   /// All that goes on with time.
   struct Moment {
@@ -118,6 +119,12 @@ class GateAxis {
     GateEdge edge{};
     std::int64_t hall_count = 0;  ///< of a Hall edge, after it
   };
+  /// What extend() integrates in one part of the tick.
+  struct Part {
+    Picoseconds to = 0;
+    LegLevels levels{};
+    std::uint64_t joined = 0;  ///< bit 0 for a: legs that change within it without moving their voltage
+  };
   /// What save() writes; behind it the events that have been told and not been handed out.
   struct Saved {
     Moment base{};
@@ -138,6 +145,14 @@ class GateAxis {
   void go_back(const AxisState& state);
   /// Runs one piece, which ends at `limit` at the latest.
   void extend(Picoseconds limit);
+  /// The part that begins now. With ideal switches and diodes a leg whose switches are open is where the
+  /// closed switch of the rail beside its conducting diode would hold it: `may_join` lets the part go on over
+  /// changes between the two, such as dead time, as long as that current flows.
+  Part part_up_to(Picoseconds limit, bool may_join) const noexcept;
+  /// extend(), with joined legs or without; false if the current of a joined leg has not gone on.
+  bool try_to_extend(Picoseconds limit, bool may_join);
+  /// Whether the axis has come to the end of the part. False if the current of a joined leg has not gone on.
+  bool run_part(const Part& part);
   void log_events(Picoseconds from);
   void log_hall(Picoseconds from);
   void log_one(const Logged& event, std::size_t first);
@@ -173,12 +188,14 @@ class GateAxis {
   GateTap tap_;
   Encoder hall_;  ///< whose counts are sectors
   double pole_pairs_;
+  bool may_join_;
   Picoseconds period_;
   int substeps_;
 
-  Clock clock_{};  ///< where the axis is: at the end of a piece, not before now_
-  Moment base_{};  ///< where that piece, or the first one that next_edge() has looked at, began
-  Moment here_{};  ///< at now_, if run_to_now() has been there since begin_here(); else at kNowhere
+  Clock clock_{};      ///< where the axis is: at the end of a piece, not before now_
+  Moment base_{};      ///< where that piece, or the first one that next_edge() has looked at, began
+  Moment unjoined_{};  ///< before a part with joined legs that does not begin at base_
+  Moment here_{};      ///< at now_, if run_to_now() has been there since begin_here(); else at kNowhere
   Picoseconds now_ = 0;
   std::vector<Logged> log_{};                   ///< what happens from base_ on
   std::size_t passed_ = 0;                      ///< of them, which have been handed out

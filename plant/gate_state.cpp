@@ -35,9 +35,11 @@ bool GateAxis::is_possible(const Logged& event) const noexcept {
 
 bool GateAxis::is_possible(const Saved& saved) const noexcept {
   const Clock& clock = saved.base.clock;
+  const auto is_sign = [](std::int64_t flow) { return flow >= -1 && flow <= 1; };
   const auto is_leg = [&clock](const LegTimer& leg) { return leg.is_possible(clock.at); };
   return clock.at >= 0 && clock.at <= saved.now && saved.now <= kLastPicosecond &&
          (clock.tick_open == 0 || clock.tick_open == 1) && std::ranges::all_of(clock.legs, is_leg) &&
+         std::ranges::all_of(clock.flow, is_sign) &&
          is_possible_hall_count(clock.hall_count, saved.base.axis) &&
          is_possible_hall_count(saved.told.hall_count, saved.base.axis) && saved.told.levels < 8;
 }

@@ -65,10 +65,10 @@ static void commutate(uint32_t now) {
   ++commutations;
 }
 
-/* Whether the open phase crosses the neutral, and when. Its current dies in a diode first: for a quarter of a
- * step the comparator does not count. */
+/* Whether the open phase crosses the neutral, and when. Its current dies in a diode first: until then the
+ * comparator does not count. A quarter of a step is too little where the motor speeds up. */
 static int crossing(uint32_t now, uint32_t* at) {
-  const uint32_t blanking = step_counts / 4, since = now - commutated;
+  const uint32_t blanking = (state == kRun ? 3 : 2) * step_counts / 8, since = now - commutated;
   const int open = kSteps[step].open;
   if (crossed || since < blanking || comparator_level(open) != kSteps[step].rises) return 0;
   *at = comparator_capture(open);

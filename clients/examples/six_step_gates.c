@@ -35,6 +35,7 @@ static void set_leg(int leg, uint32_t mode, float duty) {
 #define ALIGN_TIME (300 * MS)
 #define FIRST_STEP (20 * MS)                    /* 71 rpm */
 #define LAST_STEP (2500 * US)                   /* 571 rpm */
+#define SHORTEST_STEP (60 * US)                 /* 23,800 rpm: never below */
 #define GOOD_STEPS 6                            /* in a row, before the comparators take over */
 #define RPM_TIME (60e12f / (6.0f * POLE_PAIRS)) /* rpm times the time of a step */
 
@@ -68,7 +69,9 @@ static void commutate(void) {
   step = (step + 1) % 6;
   commutated = now;
   crossed = blanked = 0;
-  blanked_at = now + step_time / 4; /* until then the current of the open phase dies in a diode */
+  /* Until then the current of the open phase dies in a diode, which looks like a crossing: a quarter of the
+   * step is too little where the motor speeds up. */
+  blanked_at = now + (state == kRun ? 3 : 2) * step_time / 8;
   given_up_at = state == kRun ? now + 2 * step_time : NEVER;
   commutate_at = state == kRun ? NEVER : now + step_time;
   ++commutations;
@@ -90,6 +93,7 @@ static void crossing(uint64_t at) {
     }
   } else if (state == kRun) {
     step_time = (3 * step_time + (at - last_crossing)) / 4;
+    if (step_time < SHORTEST_STEP) step_time = SHORTEST_STEP;
     speed_rpm = RPM_TIME / (float)step_time;
     commutate_at = at + step_time * 3 / 8; /* half a step, less 7.5 degrees for the current to turn over */
   }

@@ -31,11 +31,9 @@ struct TerminalDrive {
 
   /// Diodes clamp to plus and minus this.
   constexpr double clamp_v() const noexcept { return rail_v + diode_v; }
-  /// A floating terminal beyond this conducts. An event that was located there may be short of it by
-  /// rounding.
-  constexpr double conducts_above_v() const noexcept {
-    return diode_v > 0.0 ? clamp_v() * (1.0 - 1e-12) : rail_v;
-  }
+  /// A floating terminal that passes this begins to conduct, as one beyond clamp_v() does: by more than the
+  /// rounding with which the instant is located.
+  constexpr double turns_on_at_v() const noexcept { return clamp_v() * (1.0 + 1e-12); }
 };
 
 }  // namespace drivebench

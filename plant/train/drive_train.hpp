@@ -80,6 +80,8 @@ class DriveTrain final : public Train {
     bool has_switching = false;  ///< one of the next two ends the piece
     TerminalSet turning_on = 0;  ///< terminals whose diodes begin to conduct where they pass a rail
     bool floats_alone = false;   ///< and no terminal of the star is held
+    bool knows_end = false;      ///< end_v has been asked for
+    PhaseValues end_v{};         ///< with turning_on: the terminals where the piece has come to
     bool watched = false;        ///< by the break input
   };
 
@@ -154,13 +156,23 @@ class DriveTrain final : public Train {
   /// The voltages of the terminals at both ends of the piece and in its mean.
   void take_switch_voltages(Connection connection, const PhaseValues& from_a,
                             const PhaseValues& to_a) noexcept;
+  /// Whether the instant at which a diode begins to conduct is an event.
+  static bool watches_diodes(const AxisCore& core) noexcept {
+    return core.p.drive.kind == DriveKind::kSwitched;
+  }
   /// What the piece has to watch beside the currents that die.
   [[gnu::noinline]] void watch_switching(const AxisCore& core, const AxisState& state) noexcept;
+  /// The terminals at the start of the piece, where this is the state of the machine.
+  PhaseValues first_v(const AxisCore& core, const State& x, const RotorMotion& motion) const noexcept {
+    return piece_.open || piece_.floats_alone ? floating_within(core, x, motion) : piece_.circuit.start_v;
+  }
   /// The terminals where the piece has come to this state of the machine.
   PhaseValues floating_within(const AxisCore& core, const State& x, const RotorMotion& motion) const noexcept;
   /// Diodes that begin to conduct, and currents at the limit of the break input.
+  /// `terminal_v` are the terminals in this state.
   [[gnu::noinline]] void add_switching(const AxisCore& core, const AxisState& state, const State& x,
-                                       const RotorMotion& motion, EventValues& values) const noexcept;
+                                       const RotorMotion& motion, const PhaseValues& terminal_v,
+                                       EventValues& values) const noexcept;
   /// The number of events of terminals and emf before those of the break input.
   int first_break_event() const noexcept;
   /// Makes it a circuit of constant voltages in which no current dies.

@@ -52,19 +52,21 @@ auto DriveTrain<Machine, Shaft>::cut_at_event(AxisCore& core, AxisState& state, 
   const TerminalSet dying = piece_.circuit.dying;
   const double corner = corner_between(motion_of(from), motion_of(to));
   if constexpr (kSwitching) piece_.corner = corner;
-  const auto found_at = [&](const Whole& x, const PhaseValues& current_a) noexcept {
-    if constexpr (!kSwitching) {
-      return values_at(core, dying, current_a, x, branch, load_nm, corner);
-    } else {
-      EventValues found = values_at(core, dying, current_a, x, branch, load_nm, corner);
-      add_switching(core, state, x.machine, motion_of(x), found);
-      return found;
-    }
+  const auto found_at = [&](const Whole& x, const PhaseValues& current_a,
+                            const PhaseValues& terminal_v) noexcept {
+    EventValues found = values_at(core, dying, current_a, x, branch, load_nm, corner);
+    if constexpr (kSwitching) add_switching(core, state, x.machine, motion_of(x), terminal_v, found);
+    return found;
   };
   const auto values = [&](const Whole& x) noexcept {
-    return found_at(x, dying != 0 ? currents(core, state, x.machine, motion_of(x)) : PhaseValues{});
+    if (piece_.turning_on != 0) {
+      piece_.end_v = floating_within(core, x.machine, motion_of(x));
+      piece_.knows_end = true;
+    }
+    return found_at(x, dying != 0 ? currents(core, state, x.machine, motion_of(x)) : PhaseValues{},
+                    piece_.end_v);
   };
-  const EventValues before = found_at(from, piece_.current_a);
+  const EventValues before = found_at(from, piece_.current_a, first_v(core, from.machine, motion_of(from)));
   const Crossing crossing = located_event(before, values(to), [&](double fraction) noexcept {
     const double shorter_s = fraction * duration_s;
     reconnect_piece(core, state, start_s, shorter_s, from.machine, motion_of(from));

@@ -92,8 +92,12 @@ void DriveTrain<Machine, Shaft>::finish_piece(AxisCore& core, AxisState& state,
     if (piece_.switch_ohm != 0.0) take_switch_voltages(core.connection, from_a, piece_.current_a);
     const bool follows_terminals = core.p.sensors.follow_terminals();
     Followed followed{};
-    if (follows_terminals)
-      followed.last_v = within_piece_v(core, floating_terminals(core), to, to_motion, piece_.circuit.end_v);
+    if (follows_terminals) {
+      const bool known = piece_.turning_on != 0 && piece_.knows_end;
+      followed.last_v =
+          known ? piece_.end_v
+                : within_piece_v(core, floating_terminals(core), to, to_motion, piece_.circuit.end_v);
+    }
     followed.end_v = core.tap != nullptr && keeps_circuit(core, state, followed.last_v)
                          ? followed.last_v
                          : end_voltages(core, state, to, to_motion);
@@ -201,7 +205,8 @@ void DriveTrain<Machine, Shaft>::run_smooth(AxisCore& core, Whole& x, double sta
 template <class Machine, class Shaft>
 bool DriveTrain<Machine, Shaft>::goes_on(AxisCore& core, AxisState& state, double start_s,
                                          const Whole& x) noexcept {
-  if (piece_.stays) return piece_.plain || leave_open(core, x.machine, motion_of(x));
+  if (piece_.stays)
+    return piece_.plain || (!piece_.has_switching && leave_open(core, x.machine, motion_of(x)));
   if (!piece_.plain || !core.drive.only_switches(state.drive)) return false;
   if (!core.drive.switch_terminals(state.drive, start_s, piece_.drive)) return piece_.circuit.dying == 0;
   if (driven_count(core.connection, piece_.drive) != terminal_count(core.connection)) return false;
@@ -329,7 +334,11 @@ void DriveTrain<Machine, Shaft>::add_events(const AxisCore& core, const AxisStat
     current_a = end == PieceEnd::kStart ? piece_.current_a : currents(core, state, piece_.stage, at);
   add_electrical(dying, current_a, at, piece_.corner, values);
   if (!piece_.has_switching) return;
-  add_switching(core, state, end == PieceEnd::kStart ? piece_.from : piece_.stage, at, values);
+  const State& x = end == PieceEnd::kStart ? piece_.from : piece_.stage;
+  PhaseValues terminal_v{};
+  if (piece_.turning_on != 0)
+    terminal_v = end == PieceEnd::kStart ? first_v(core, x, at) : floating_within(core, x, at);
+  add_switching(core, state, x, at, terminal_v, values);
 }
 
 template <class Machine, class Shaft>

@@ -9,8 +9,8 @@ namespace drivebench {
 template <class Machine, class Shaft>
 void DriveTrain<Machine, Shaft>::watch_switching(const AxisCore& core, const AxisState& state) noexcept {
   piece_.turning_on = 0;
-  piece_.floats_alone = false;
-  if (piece_.drive.diode_v > 0.0) {
+  piece_.floats_alone = piece_.knows_end = false;
+  if (piece_.off != 0 && watches_diodes(core)) {
     for (int k = 0; k < terminal_count(core.connection); ++k) {
       const bool diodes = piece_.drive.mode[static_cast<std::size_t>(k)] == TerminalMode::kDiodes;
       if (diodes && (piece_.off & terminal_bit(k)) != 0) piece_.turning_on |= terminal_bit(k);
@@ -70,31 +70,30 @@ template <class Machine, class Shaft>
 PhaseValues DriveTrain<Machine, Shaft>::floating_within(const AxisCore& core, const State& x,
                                                         const RotorMotion& motion) const noexcept {
   if (piece_.floats_alone) return open_terminal_voltages(core.connection, open_v(x, motion), 0.0);
-  const PhaseValues current_a =
-      terminal_currents(core.connection, winding_currents(c_, x, motion), piece_.off);
-  const TerminalSet driven = driven_terminals(core.connection, piece_.drive);
-  const PhaseValues held_v = behind_switches(
-      core.connection, piece_.drive, before_switches(core.connection, piece_.circuit.start_v), current_a);
-  return with_floating(core.connection, piece_.off & ~driven, held_v,
-                       floating_v(x, motion, input_behind_switches(core.connection, x, motion)));
+  PhaseValues held_v = piece_.circuit.start_v;
+  if (piece_.switch_ohm != 0.0) {
+    held_v = behind_switches(core.connection, piece_.drive, before_switches(core.connection, held_v),
+                             terminal_currents(core.connection, winding_currents(c_, x, motion), piece_.off));
+  }
+  return within_piece_v(core, floating_terminals(core), x, motion, held_v);
 }
 
 template <class Machine, class Shaft>
 void DriveTrain<Machine, Shaft>::add_switching(const AxisCore& core, const AxisState& state, const State& x,
-                                               const RotorMotion& motion,
+                                               const RotorMotion& motion, const PhaseValues& terminal_v,
                                                EventValues& values) const noexcept {
-  const double clamp_v = piece_.drive.clamp_v();
   if (piece_.turning_on != 0) {
-    ThreePhase v = phases_of(floating_within(core, x, motion));
+    const double turns_on_v = piece_.drive.turns_on_at_v();
+    ThreePhase v = phases_of(terminal_v);
     double highest_v = -1e300;
     double lowest_v = 1e300;
     for (int k = 0; k < 3; ++k) {
       if ((piece_.turning_on & terminal_bit(k)) == 0) continue;
       highest_v = std::max(highest_v, phase(v, k));
       lowest_v = std::min(lowest_v, phase(v, k));
-      if (!piece_.floats_alone) values.add(clamp_v - std::abs(phase(v, k)));
+      if (!piece_.floats_alone) values.add(turns_on_v - std::abs(phase(v, k)));
     }
-    if (piece_.floats_alone) values.add(2.0 * clamp_v - (highest_v - lowest_v));
+    if (piece_.floats_alone) values.add(2.0 * turns_on_v - (highest_v - lowest_v));
   }
   if (!piece_.watched) return;
   const double limit_a = core.p.drive.inverter.break_current_a;

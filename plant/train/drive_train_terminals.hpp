@@ -125,9 +125,10 @@ void DriveTrain<Machine, Shaft>::connect_piece(AxisCore& core, AxisState& state,
   }
   piece_.switch_ohm = sound ? piece_.drive.switch_ohm : 0.0;
   piece_.connection = core.connection;
-  if (core.breaks || piece_.drive.diode_v > 0.0) {
+  if (core.breaks || (piece_.off != 0 && watches_diodes(core))) {
     watch_switching(core, state);
   } else {
+    piece_.turning_on = 0;
     piece_.has_switching = piece_.watched = false;
   }
 }
@@ -169,7 +170,7 @@ bool DriveTrain<Machine, Shaft>::keeps_circuit(const AxisCore& core, const AxisS
   if (core.connection == Connection::kStar && std::popcount(piece_.off) > 1) return false;
   const ThreePhase v = phases_of(last_v);
   const auto blocks = [&](int k, double terminal_v) noexcept {
-    return (piece_.off & terminal_bit(k)) == 0 || std::abs(terminal_v) <= piece_.drive.conducts_above_v();
+    return (piece_.off & terminal_bit(k)) == 0 || std::abs(terminal_v) <= piece_.drive.clamp_v();
   };
   return blocks(0, v.a) && blocks(1, v.b) && blocks(2, v.c);
 }

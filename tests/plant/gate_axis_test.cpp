@@ -12,64 +12,17 @@
 #include "plant/drive/phases.hpp"
 #include "plant/injected_faults.hpp"
 #include "tests/plant/bridge_rig.hpp"
+#include "tests/plant/gate_course.hpp"
 
 namespace drivebench {
 namespace {
 
 using namespace bridge_rig;
-
-constexpr std::int64_t kPeriodNs = 50'000;
-constexpr Picoseconds kMicro = 1'000'000;
-constexpr Picoseconds kMilli = 1'000 * kMicro;
-
-/// A motor that turns, with comparators behind noise and Hall lines, on a battery.
-AxisParameters turning_motor() {
-  AxisParameters p = standing_motor();
-  p.mechanics = {.inertia_kgm2 = 2e-6};
-  p.drive.bus.resistance_ohm = 0.03;
-  p.drive.bus.capacitance_f = 0.5e-3;
-  p.drive.bus.battery = true;
-  p.sensors.comparator = {.enabled = true, .rc_s = 0.5e-6, .hysteresis_v = 20e-3, .noise_rms_v = 5e-3};
-  p.sensors.hall.enabled = true;
-  return p;
-}
-
-LegSetting pwm(double duty, Picoseconds period = 20 * kMicro, Picoseconds dead = 200'000) {
-  return {.mode = LegMode::kPwm,
-          .period = period,
-          .compare = static_cast<Picoseconds>(duty * static_cast<double>(period)),
-          .dead = dead};
-}
+using namespace gate_course;
 
 bool same(const GateEdge& a, const GateEdge& b) {
   return a.at == b.at && a.kind == b.kind && a.channel == b.channel && a.level == b.level;
 }
-
-/// Six-step by the clock: the motor follows a field that is turned for it.
-struct Course {
-  GateAxis axis;
-  std::vector<GateEdge> edges{};
-
-  explicit Course(const AxisParameters& p, int substeps = 4) : axis(p, kPeriodNs, substeps, 7, 0) {}
-
-  void run(Picoseconds until, std::size_t room) {
-    std::vector<GateEdge> some(room);
-    for (std::size_t written = room; written == room;) {
-      written = axis.run(until, some);
-      edges.insert(edges.end(), some.begin(), some.begin() + static_cast<std::ptrdiff_t>(written));
-    }
-  }
-  void set_step(int step, double duty = 0.2) {
-    constexpr int kHighLeg[6] = {1, 1, 2, 2, 0, 0};
-    constexpr int kLowLeg[6] = {2, 0, 0, 1, 1, 2};
-    for (int k = 0; k < 3; ++k) {
-      const LegSetting open{};
-      const LegSetting low{.mode = LegMode::kLow, .dead = 200'000};
-      axis.set_leg(static_cast<std::size_t>(k),
-                   k == kHighLeg[step] ? pwm(duty) : (k == kLowLeg[step] ? low : open));
-    }
-  }
-};
 
 constexpr auto kAnyState = [](const AxisState&) noexcept { return true; };
 
@@ -78,12 +31,12 @@ constexpr int kSteps = 30;
 
 // Catches: a piece that ends where the client asks, noise or an edge that depends on when it is asked for.
 TEST(GateAxis, NothingDependsOnHowTheRunIsDivided) {
-  Course whole(turning_motor());
+  GateCourse whole(turning_motor());
   for (int n = 0; n < kSteps; ++n) {
     whole.set_step(n % 6);
     whole.run((n + 1) * kStep, 64);
   }
-  Course parts(turning_motor());
+  GateCourse parts(turning_motor());
   std::mt19937_64 random(3);
   std::uniform_int_distribution<Picoseconds> part(1, 40 * kMicro);
   for (int n = 0; n < kSteps; ++n) {
@@ -117,7 +70,7 @@ TEST(GateAxis, NothingDependsOnHowTheRunIsDivided) {
 
 // Catches: a state that was read at an instant and is shown there again after a leg has been set.
 TEST(GateAxis, ALegThatIsSetWhereTheStateWasReadShows) {
-  Course course(turning_motor());
+  GateCourse course(turning_motor());
   course.axis.set_leg(1, {.mode = LegMode::kLow});
   course.axis.run(kStep, {});
   EXPECT_EQ(course.axis.look().levels[0], LegLevel::kOff);
@@ -128,7 +81,7 @@ TEST(GateAxis, ALegThatIsSetWhereTheStateWasReadShows) {
 
 /// The current of the motor at each end of a PWM period, in six steps of 400 us, on so many substeps.
 std::vector<double> currents_on_battery(int substeps) {
-  Course course(turning_motor(), substeps);
+  GateCourse course(turning_motor(), substeps);
   std::vector<double> current_a;
   for (int n = 0; n < 20; ++n) {
     course.set_step(n % 6, 0.9);
@@ -157,7 +110,7 @@ TEST(GateAxis, TheLinkOfABatteryMovesWithinAStep) {
 // Catches: an edge that is told twice or lost where a leg is set just beside it, levels that do not
 // alternate.
 TEST(GateAxis, LevelsAlternateWhereverLegsAreSet) {
-  Course course(turning_motor());
+  GateCourse course(turning_motor());
   std::mt19937_64 random(5);
   std::uniform_int_distribution<Picoseconds> part(1, 60 * kMicro);
   int step = 0;
@@ -195,7 +148,7 @@ TEST(GateAxis, TheEncoderCountsTheAngle) {
   AxisParameters p = turning_motor();
   p.encoder.counts_per_revolution = 4096;
   const Encoder encoder(p.encoder, 1e-9 * kPeriodNs);
-  Course course(p);
+  GateCourse course(p);
   for (int n = 0; n < kSteps; ++n) {
     course.set_step(n % 6);
     course.run((n + 1) * kStep, 64);
@@ -210,7 +163,7 @@ TEST(GateAxis, TheEncoderCountsTheAngle) {
 // the end of another part, or before a current has died.
 TEST(GateAxis, TheTerminalsThatAreReadAreThoseThatAreIntegrated) {
   constexpr Picoseconds kNano = 1'000;
-  Course course(turning_motor());
+  GateCourse course(turning_motor());
   std::mt19937_64 random(11);
   std::uniform_int_distribution<Picoseconds> part(1, 40 * kMicro);
   int compared = 0;
@@ -275,7 +228,7 @@ TEST(GateAxis, TheEnergiesAddUp) {
   AxisParameters p = turning_motor();
   p.drive.inverter.switch_ohm = 5e-3;
   p.drive.inverter.diode_v = 0.8;
-  Course course(p);
+  GateCourse course(p);
   for (int n = 0; n < kSteps; ++n) {
     course.set_step(n % 6);
     course.run((n + 1) * kStep, 64);
@@ -290,7 +243,7 @@ TEST(GateAxis, TheEnergiesAddUp) {
 
 // Catches: a state that leaves out timers, what has been told, or the events that are still to be handed out.
 TEST(GateAxis, ASavedStateGoesOnToTheBit) {
-  Course first(turning_motor());
+  GateCourse first(turning_motor());
   for (int n = 0; n < 10; ++n) {
     first.set_step(n % 6);
     first.run((n + 1) * kStep, 64);
@@ -298,10 +251,10 @@ TEST(GateAxis, ASavedStateGoesOnToTheBit) {
   first.run(10 * kStep + 3 * kMicro, 64);
   first.axis.next_edge(11 * kStep);
   const std::vector<std::byte> saved = first.axis.save();
-  Course second(turning_motor());
+  GateCourse second(turning_motor());
   ASSERT_TRUE(second.axis.restore(saved, kAnyState));
   first.edges.clear();
-  for (Course* course : {&first, &second}) {
+  for (GateCourse* course : {&first, &second}) {
     course->run(11 * kStep, 64);
     course->set_step(4);
     course->run(14 * kStep, 64);

@@ -10,7 +10,7 @@ import zipfile
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[2] / "helpers"))
 try:
     from free_port import free_ports, free_udp_port
-    from regression_case import COMMAND, FAILED, OK, USAGE, RegressionTest
+    from regression_case import COMMAND, FAILED, INVALID, OK, USAGE, RegressionTest
     from wire_client import PATIENCE_S
 except ImportError as missing:
     print(f"skipped: {missing}")
@@ -97,6 +97,16 @@ class Attached(RegressionTest):
     def case(self, way, place, limit_s=30.0, watchdog=250, extra=""):
         return self.write("case.toml", CASE.format(way=way, place=place, limit_s=limit_s, watchdog=watchdog, extra=extra))
 
+    def rerun(self, bundle):
+        """What `rerun` says of a failing bundle, once no tick of the bench was late: a loaded machine makes a run invalid."""
+        for _ in range(20):
+            done = subprocess.run([COMMAND, "rerun", str(bundle)], capture_output=True, text=True, env=self.environment,
+                                  timeout=PATIENCE_S, check=False)
+            if done.returncode != INVALID:
+                break
+        self.assertEqual(done.returncode, FAILED, done.stdout + done.stderr)
+        return done.stdout
+
     def test_a_drive_on_each_bus_is_judged_from_its_arming_on(self):
         """Catches: a bench without the bus at which the drive waits, steps and windows that count from the start of the bench, a drive
         that is told to end."""
@@ -150,10 +160,8 @@ class Attached(RegressionTest):
             bundle = self.folder / "kept/case.zip"
             with zipfile.ZipFile(bundle) as parts:
                 self.assertNotIn("[tcp]", parts.read("bench.toml").decode())
-            again = subprocess.run([COMMAND, "rerun", str(bundle)], capture_output=True, text=True, env=self.environment,
-                                   timeout=PATIENCE_S, check=False)
-        self.assertIn(again.returncode, (FAILED, 4), again.stdout + again.stderr)
-        self.assertIn("the device under test was not started anew: no samples are compared", again.stdout)
+            again = self.rerun(bundle)
+        self.assertIn("the device under test was not started anew: no samples are compared", again)
         replayed = subprocess.run([COMMAND, "rerun", str(bundle), "--plant-only"], capture_output=True, text=True,
                                   env=self.environment, timeout=PATIENCE_S, check=False)
         self.assertEqual(replayed.returncode, OK, replayed.stdout + replayed.stderr)
@@ -180,10 +188,8 @@ class Attached(RegressionTest):
             bundle = self.folder / "kept/case.zip"
             with zipfile.ZipFile(bundle) as parts:
                 self.assertFalse([name for name in parts.namelist() if b"of-the-" in parts.read(name)])
-            again = subprocess.run([COMMAND, "rerun", str(bundle)], capture_output=True, text=True, env=self.environment,
-                                   timeout=PATIENCE_S, check=False)
-        self.assertIn(again.returncode, (FAILED, 4), again.stdout + again.stderr)
-        self.assertIn("turns", again.stdout)
+            again = self.rerun(bundle)
+        self.assertIn("turns", again)
         self.case("tcp", place, limit_s=1)
         with self.drive(f"tcp:127.0.0.1:{port}"):  # with the token of a viewer
             self.assertIn("never armed within 1 s: no device under test took the lease", self.suite(code=FAILED)["cases"][0]["reason"])
