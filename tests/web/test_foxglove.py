@@ -17,6 +17,7 @@ except ImportError:
 
 HERE = pathlib.Path(__file__).resolve().parent
 sys.path.insert(0, str(HERE.parent / "helpers"))
+import npm_package
 from command_test import USAGE, CommandTest
 from foxglove_client import Foxglove
 from web_client import PAGE, Gateway, Refused
@@ -46,11 +47,7 @@ class Peer(FoxgloveTest):
             if shutil.which(program) is None:
                 self.skipTest(f"no {program}")
         self.package = self.folder / "foxglove"
-        shutil.copytree(HERE / "foxglove", self.package, ignore=shutil.ignore_patterns("node_modules"))
-        installed = subprocess.run(["npm", "ci", "--no-audit", "--no-fund", "--ignore-scripts"], cwd=self.package, capture_output=True,
-                                   text=True, timeout=300, check=False)
-        if installed.returncode != 0:
-            self.skipTest(f"npm cannot install @foxglove/ws-protocol: {installed.stderr.strip().splitlines()[-1:]}")
+        npm_package.install(HERE / "foxglove", self.package)
 
     def test_foxgloves_own_client_sees_the_speed_rise(self):
         """Catches: an opcode, a byte order, a schema or a time that Foxglove does not read, or a unit that is not told."""

@@ -20,6 +20,7 @@ except ImportError:
 
 HERE = pathlib.Path(__file__).resolve().parent
 sys.path.insert(0, str(HERE.parent / "helpers"))
+import npm_package
 from web_client import PAGE, Gateway
 from wire_client import BENCHES, REPOSITORY, Server, pb
 from wire_test import until
@@ -76,11 +77,7 @@ class PageTest(unittest.TestCase):
         cls.addClassCleanup(folder.cleanup)
         cls.folder = pathlib.Path(folder.name)
         cls.package = cls.folder / "browser"
-        shutil.copytree(HERE / "browser", cls.package, ignore=shutil.ignore_patterns("node_modules"))
-        installed = subprocess.run(["npm", "ci", "--no-audit", "--no-fund", "--ignore-scripts"], cwd=cls.package, capture_output=True,
-                                   text=True, timeout=300, check=False)
-        if installed.returncode != 0:
-            raise unittest.SkipTest(f"npm cannot install puppeteer-core: {installed.stderr.strip().splitlines()[-1:]}")
+        npm_package.install(HERE / "browser", cls.package)
 
     def serve(self, *options, **more):
         server = Server(*options, **more)
