@@ -1,7 +1,7 @@
 """A client of Foxglove's WebSocket that can break every rule of the protocol."""
 import json
 
-from web_client import BINARY, CLOSE, TEXT, Browser
+from web_client import BINARY, CLOSE, PING, PONG, TEXT, Browser
 
 
 class Foxglove(Browser):
@@ -13,6 +13,9 @@ class Foxglove(Browser):
     def message(self):
         """The next text as an object, or the bytes of a binary message."""
         opcode, data = self.read_frame()
+        while opcode == PING:
+            self.send_frame(PONG, data)
+            opcode, data = self.read_frame()
         if opcode == CLOSE:
             self.closed_by(data)
         return json.loads(data) if opcode == TEXT else data

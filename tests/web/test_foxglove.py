@@ -124,7 +124,12 @@ class Strangers(FoxgloveTest):
         client.subscribe(channel=2, number=9)  # nothing of the refused messages stands in its way
         with self.bench.client() as controller:
             controller.lease()
-            controller.step(0, 1.0, 0.0)
+            tick = 0
+            # Nothing answers a subscription: steps until it is in force.
+            while not select.select([client.socket], [], [], 0.1)[0]:
+                self.assertLess(tick, PATIENCE_S * 10, "the client does not get its first sample")
+                controller.step(tick, 1.0, 0.0)
+                tick += 1
             message = client.message()
         self.assertEqual(struct.unpack("<BI", message[:5]), (1, 9))
         sample = pb.Sample()
