@@ -31,11 +31,11 @@ void copy_but_standing(const AxisState& from, AxisState& to) noexcept {
   copy(sensors.data() + sensors.size(), begin + sizeof(AxisState));
 }
 
-/// next_edge() and what base_ is behind now by [pieces].
+/// next_edge() and what base_ is behind now by [parts].
 constexpr std::size_t kMostBehind = 16;
 
 /// Whether an open switch beside a conducting diode is as good as a closed one.
-bool joins_legs(const AxisParameters& p) {
+bool can_join_legs(const AxisParameters& p) {
   return !has_switch_losses(p.drive) && p.drive.inverter.bootstrap_s == 0.0;
 }
 
@@ -53,7 +53,7 @@ GateAxis::GateAxis(const AxisParameters& p, std::int64_t period_ns, int substeps
              .half_count_offset = true},
             1e-9 * static_cast<double>(period_ns)),
       pole_pairs_(pole_pairs_of_machine(p)),
-      may_join_(joins_legs(p)),
+      joins_legs_(can_join_legs(p)),
       period_(1000 * period_ns),
       substeps_(substeps) {
   constexpr std::size_t kRoomForEvents = 1024;
@@ -204,7 +204,7 @@ void GateAxis::catch_up() {
   const Picoseconds begun = base_.clock.at;
   const std::size_t known = log_.size();
   std::size_t over = told_count_;
-  Picoseconds pieces = 0;
+  Picoseconds parts = 0;
   go_back(base_);
   while (true) {
     extend(LegTimer::kNever);
@@ -212,11 +212,11 @@ void GateAxis::catch_up() {
     log_.resize(known);
     if (clock_.at > now_ || over + here > passed_) break;
     over += here;
-    ++pieces;
+    ++parts;
     keep(base_);
   }
   go_back(ahead);
-  if (pieces == 0) return;
+  if (parts == 0) return;
   log_.erase(log_.begin(), log_.begin() + static_cast<std::ptrdiff_t>(over));
   passed_ -= over;
   told_count_ = 0;
@@ -224,7 +224,7 @@ void GateAxis::catch_up() {
   for (std::size_t n = 0; n < passed_; ++n) {
     if (log_[n].edge.kind == EventKind::kHall) told_.hall_count = log_[n].hall_count;
   }
-  const Picoseconds usual = (base_.clock.at - begun) / pieces;
+  const Picoseconds usual = (base_.clock.at - begun) / parts;
   catch_up_at_ = base_.clock.at + static_cast<Picoseconds>(kMostBehind) * std::max<Picoseconds>(usual, 1);
 }
 
@@ -244,7 +244,7 @@ void GateAxis::set_load(double load_nm) {
 void GateAxis::set_parameters(const AxisParameters& p) {
   stop_here();
   axis_.set_parameters(with_terminals(p));
-  may_join_ = joins_legs(p);
+  joins_legs_ = can_join_legs(p);
   if (clock_.tick_open != 0) axis_.take_changes(tick());
   keep(base_);
 }

@@ -24,11 +24,11 @@ struct GateEdge {
 /// An axis on a switched inverter at gate level: the legs are set at any instant, their timers play PWM and
 /// dead time, and time goes on to any instant.
 ///
-/// A piece ends at a change of a leg, at an event of the plant and on the grid of the steps of the tick,
-/// never because a client asks: it is integrated to its end at once, and what happens in it is told as time
-/// passes. set_leg() within it takes it back and integrates it up to that instant. So nothing depends on how
-/// a client divides its run. The grid, the tick and the noise are those of the bench; parameters, load and
-/// temperature are those of the tick.
+/// A tick is integrated in parts. One ends at a change of a leg, unless that moves no voltage, and on the
+/// grid of the steps of the tick, never because a client asks: it is integrated to its end at once, and what
+/// happens in it is told as time passes. set_leg() within it takes it back and integrates it up to that
+/// instant. So nothing depends on how a client divides its run. The grid, the tick and the noise are those of
+/// the bench; parameters, load and temperature are those of the tick.
 class GateAxis {
  public:
   /// The parameters must be free of problems() and have a switched inverter.
@@ -77,7 +77,7 @@ class GateAxis {
   Now look();
   /// Whether it has before now, however far next_edge() has looked.
   bool diverged() const noexcept { return clock_.diverged_from < now_; }
-  /// Events that a piece had beyond the room for them.
+  /// Events that a part had beyond the room for them.
   std::uint64_t lost_events() const noexcept { return tap_.events.lost(); }
 
   /// The whole state but the parameters.
@@ -92,7 +92,7 @@ class GateAxis {
     Picoseconds at = 0;
     std::int64_t tick_open = 0;                    ///< 1: within a tick
     std::int64_t hall_count = 0;                   ///< sectors of 60 electrical degrees
-    Picoseconds diverged_from = LegTimer::kNever;  ///< the start of the piece in which the machine has
+    Picoseconds diverged_from = LegTimer::kNever;  ///< the start of the part in which the machine has
     std::array<LegTimer, 3> legs{};
     std::array<std::int64_t, 3> flow{};  ///< signs of the terminals' currents
   };
@@ -102,7 +102,7 @@ class GateAxis {
     GateSums sums{};
     AxisState axis{};
   };
-  /// What has been told of the comparators and Hall lines: a piece that is cut goes on from there, because
+  /// What has been told of the comparators and Hall lines: a part that is cut goes on from there, because
   /// its last digits are those of a shorter integration.
   struct Told {
     std::uint64_t levels = 0;
@@ -135,15 +135,15 @@ class GateAxis {
     std::uint64_t told_count = 0;
   };
 
-  /// Where the axis is, into a moment of this axis: each piece does so, and a whole copy has 6 kB.
+  /// Where the axis is, into a moment of this axis: each part does so, and a whole copy has 6 kB.
   void keep(Moment& moment) const;
   /// Takes the parts of a state that keep() leaves out.
   void begin_with(const AxisState& state);
-  /// Begins at the present moment: the next piece is the first one that is looked at.
+  /// Begins at the present moment: the next part is the first one that is looked at.
   void begin_here();
   void go_back(const Moment& moment);
   void go_back(const AxisState& state);
-  /// Runs one piece, which ends at `limit` at the latest.
+  /// Runs one part, which ends at `limit` at the latest.
   void extend(Picoseconds limit);
   /// The part that begins now. With ideal switches and diodes a leg whose switches are open is where the
   /// closed switch of the rail beside its conducting diode would hold it: `may_join` lets the part go on over
@@ -166,7 +166,7 @@ class GateAxis {
   }
   /// From base to now; what happens on the way is known.
   void run_to_now();
-  /// Lets base follow to the last end of a piece up to now, where a client only looks ahead and runs: else
+  /// Lets base follow to the last end of a part up to now, where a client only looks ahead and runs: else
   /// the log and what look() integrates again would grow for ever.
   void catch_up();
   bool is_possible(const Saved& saved) const noexcept;
@@ -175,7 +175,7 @@ class GateAxis {
   /// Hall sensors every count is possible.
   bool is_possible_hall_count(std::int64_t count, const AxisState& state) const noexcept;
   Now seen() const;
-  /// Lets a piece end now.
+  /// Lets a part end now.
   void stop_here();
   Tick tick() const noexcept { return clock_.at / period_; }
   Picoseconds grid_after(Picoseconds at) const noexcept;
@@ -188,19 +188,19 @@ class GateAxis {
   GateTap tap_;
   Encoder hall_;  ///< whose counts are sectors
   double pole_pairs_;
-  bool may_join_;
+  bool joins_legs_;
   Picoseconds period_;
   int substeps_;
 
-  Clock clock_{};      ///< where the axis is: at the end of a piece, not before now_
-  Moment base_{};      ///< where that piece, or the first one that next_edge() has looked at, began
+  Clock clock_{};      ///< where the axis is: at the end of a part, not before now_
+  Moment base_{};      ///< where that part, or the first one that next_edge() has looked at, began
   Moment unjoined_{};  ///< before a part with joined legs that does not begin at base_
   Moment here_{};      ///< at now_, if run_to_now() has been there since begin_here(); else at kNowhere
   Picoseconds now_ = 0;
   std::vector<Logged> log_{};                   ///< what happens from base_ on
   std::size_t passed_ = 0;                      ///< of them, which have been handed out
   std::size_t told_count_ = 0;                  ///< of them, which told_ has already
-  std::size_t ahead_ = 0;                       ///< pieces that next_edge() has looked at since base_
+  std::size_t ahead_ = 0;                       ///< parts that next_edge() has looked at since base_
   Picoseconds catch_up_at_ = LegTimer::kNever;  ///< so many that base_ has to follow
   Told told_{};
   Cut cut_{};

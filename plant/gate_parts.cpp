@@ -64,18 +64,21 @@ GateAxis::Part GateAxis::part_up_to(Picoseconds limit, bool may_join) const noex
 
 bool GateAxis::run_part(const Part& part) {
   const Picoseconds from = clock_.at;
-  tap_.events.clear();
+  tap_.begin_part();
   const std::optional<PhaseValues> end_a =
       axis_.run_part(part.levels, within_tick_s(from), within_tick_s(part.to));
-  if (!end_a) return true;
-  const std::array<std::int64_t, 3> flow{sign_of(end_a->a), sign_of(end_a->b), sign_of(end_a->c)};
-  for (std::size_t k = 0; k < flow.size(); ++k) {
+  const std::array<double, 3> lowest_a{tap_.lowest_a.a, tap_.lowest_a.b, tap_.lowest_a.c};
+  const std::array<double, 3> highest_a{tap_.highest_a.a, tap_.highest_a.b, tap_.highest_a.c};
+  bool flows = true;
+  for (std::size_t k = 0; k < clock_.legs.size(); ++k) {
     if ((part.joined >> k & 1U) == 0) continue;
-    if (flow[k] != clock_.flow[k]) return false;
     for (Picoseconds at = clock_.legs[k].next(from); at < part.to; at = clock_.legs[k].next(at))
       clock_.legs[k].go_to(at);
+    flows = flows && (clock_.flow[k] > 0 ? lowest_a[k] > 0.0 : highest_a[k] < 0.0);
   }
-  clock_.flow = flow;
+  if (!end_a) return true;
+  if (!flows) return false;
+  clock_.flow = {sign_of(end_a->a), sign_of(end_a->b), sign_of(end_a->c)};
   log_events(from);
   return true;
 }
@@ -102,7 +105,7 @@ bool GateAxis::try_to_extend(Picoseconds limit, bool may_join) {
 }
 
 void GateAxis::extend(Picoseconds limit) {
-  if (try_to_extend(limit, may_join_)) return;
+  if (try_to_extend(limit, joins_legs_ && clock_.diverged_from == LegTimer::kNever)) return;
   go_back(base_.clock.at == clock_.at ? base_ : unjoined_);
   try_to_extend(limit, false);
 }

@@ -46,7 +46,7 @@ bool GateAxis::is_possible(const Saved& saved) const noexcept {
 
 bool GateAxis::restore(std::span<const std::byte> bytes,
                        bool (*is_possible_state)(const AxisState&) noexcept) {
-  constexpr std::size_t kMostPieces = 1000;
+  constexpr std::size_t kMostParts = 1000;
   Saved saved;
   if (bytes.size() < sizeof(Saved)) return false;
   std::memcpy(&saved, bytes.data(), sizeof(Saved));
@@ -66,7 +66,7 @@ bool GateAxis::restore(std::span<const std::byte> bytes,
   if (!std::ranges::all_of(log_, [this](const Logged& event) { return is_possible(event); })) return false;
   go_back(base_);
   for (std::size_t n = 0; clock_.at < now_ || log_.size() < passed_; ++n) {
-    if (n == kMostPieces) return false;
+    if (n == kMostParts) return false;
     extend(LegTimer::kNever);
   }
   return true;

@@ -28,12 +28,18 @@ struct TerminalDrive {
   double field_v = 0.0;
   double diode_v = 0.0;     ///< forward voltage of the diodes between a terminal and a rail
   double switch_ohm = 0.0;  ///< of the closed switches between a driven terminal and its voltage
+  bool turns_on = false;    ///< the interval before ended where a floating terminal begins to conduct
 
   /// Diodes clamp to plus and minus this.
   constexpr double clamp_v() const noexcept { return rail_v + diode_v; }
-  /// A floating terminal that passes this begins to conduct, as one beyond clamp_v() does: by more than the
-  /// rounding with which the instant is located.
+  /// A floating terminal that passes this within an interval ends it, and conducts from then on.
   constexpr double turns_on_at_v() const noexcept { return clamp_v() * (1.0 + 1e-12); }
+  /// One that is beyond this at the start of an interval conducts: rounding that leaves it at the rail does
+  /// not let it begin, nor does rounding, or a link that has moved a little, keep it from beginning where it
+  /// has passed turns_on_at_v().
+  constexpr double conducts_above_v() const noexcept {
+    return clamp_v() * (turns_on ? 1.0 - 1e-6 : 1.0 + 5e-13);
+  }
 };
 
 }  // namespace drivebench

@@ -69,7 +69,7 @@ constexpr auto kTable = std::to_array<Parameter>({
     inverter<&Inverter::switch_ohm>("inverter.switch_ohm", "ohm", 0, 1e3, kLive | kLater,
                                     "R_ds(on) of a closed switch"),
     inverter<&Inverter::diode_v>("inverter.diode_v", "V", 0, 100, kLive | kLater,
-                                 "forward voltage of a diode; above 0 its turn-on is located"),
+                                 "forward voltage of a diode"),
     inverter<&Inverter::break_current_a>("inverter.break_current_a", "A", 0, 1e6, kLive | kLater,
                                          "a phase current beyond it opens all legs until cleared; 0: none"),
     inverter<&Inverter::break_delay_s>("inverter.break_delay_s", "s", 0, 1e-2, kLive | kLater,

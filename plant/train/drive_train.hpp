@@ -74,14 +74,16 @@ class DriveTrain final : public Train {
     bool open = false;        ///< no terminal is driven, none carries a current
     bool stays = false;       ///< either of them, and the next piece has the same
     TerminalSet off = 0;      ///< terminals without a current
-    // With a drive whose switches or diodes take a voltage, or with a break input:
+    // With a switched inverter, or with a break input:
     Connection connection{};
     double switch_ohm = 0.0;     ///< in series with each driven terminal
-    bool has_switching = false;  ///< one of the next two ends the piece
+    bool has_switching = false;  ///< turning_on or watched: one of them may end the piece
     TerminalSet turning_on = 0;  ///< terminals whose diodes begin to conduct where they pass a rail
     bool floats_alone = false;   ///< and no terminal of the star is held
     bool knows_end = false;      ///< end_v has been asked for
     PhaseValues end_v{};         ///< with turning_on: the terminals where the piece has come to
+    bool turns_on = false;       ///< the piece before ended where a diode begins to conduct
+    int turn_ons = 0;            ///< such ends since a piece ended at no event
     bool watched = false;        ///< by the break input
   };
 
@@ -173,8 +175,21 @@ class DriveTrain final : public Train {
   [[gnu::noinline]] void add_switching(const AxisCore& core, const AxisState& state, const State& x,
                                        const RotorMotion& motion, const PhaseValues& terminal_v,
                                        EventValues& values) const noexcept;
-  /// The number of events of terminals and emf before those of the break input.
+  /// The number of events of terminals and emf before those of diodes that begin to conduct,
+  int first_turn_on_event() const noexcept;
+  /// and before those of the break input.
   int first_break_event() const noexcept;
+  /// What has ended the piece, for the next one.
+  void note_turn_on(int electrical_event) noexcept {
+    piece_.turns_on = piece_.turning_on != 0 && electrical_event >= first_turn_on_event() &&
+                      electrical_event < first_break_event();
+    if (piece_.turns_on) ++piece_.turn_ons;
+    if (electrical_event < 0) piece_.turn_ons = 0;
+  }
+  void forget_turn_ons() noexcept {
+    piece_.turns_on = false;
+    piece_.turn_ons = 0;
+  }
   /// Makes it a circuit of constant voltages in which no current dies.
   void hold_constant(const TerminalInput& input) noexcept;
   void drive_windings(const AxisCore& core, const ThreePhase& terminal_v) noexcept;

@@ -59,14 +59,16 @@ auto DriveTrain<Machine, Shaft>::cut_at_event(AxisCore& core, AxisState& state, 
     return found;
   };
   const auto values = [&](const Whole& x) noexcept {
-    if (piece_.turning_on != 0) {
-      piece_.end_v = floating_within(core, x.machine, motion_of(x));
-      piece_.knows_end = true;
+    if constexpr (kSwitching) {
+      piece_.knows_end = piece_.turning_on != 0;
+      if (piece_.knows_end) piece_.end_v = floating_within(core, x.machine, motion_of(x));
     }
     return found_at(x, dying != 0 ? currents(core, state, x.machine, motion_of(x)) : PhaseValues{},
                     piece_.end_v);
   };
-  const EventValues before = found_at(from, piece_.current_a, first_v(core, from.machine, motion_of(from)));
+  PhaseValues begun_v{};
+  if constexpr (kSwitching) begun_v = first_v(core, from.machine, motion_of(from));
+  const EventValues before = found_at(from, piece_.current_a, begun_v);
   const Crossing crossing = located_event(before, values(to), [&](double fraction) noexcept {
     const double shorter_s = fraction * duration_s;
     reconnect_piece(core, state, start_s, shorter_s, from.machine, motion_of(from));

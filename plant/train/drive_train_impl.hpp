@@ -108,6 +108,7 @@ void DriveTrain<Machine, Shaft>::finish_piece(AxisCore& core, AxisState& state,
       followed.halfway = middle_motion(passed);
     if (follows_terminals) follow_terminals(core, state, passed, followed);
     if (core.tap != nullptr) {
+      core.tap->add_currents(phases_of(piece_.current_a));
       add_sums(core, passed, followed.halfway, from_a);
       core.drive.finish(state.drive, start_s, duration_s, piece_.drive, piece_.circuit.mean_v, from_a,
                         piece_.current_a);
@@ -169,6 +170,7 @@ void DriveTrain<Machine, Shaft>::run_piece(AxisCore& core, AxisState& state, Who
     start_s = cut.fraction < 1.0 ? start_s + passed_s : stop_s;
     if (core.tap != nullptr) tell_deaths(core, state.open_terminals & ~open_before, start_s);
     if (piece_.watched && cut.electrical_event >= first_break_event()) pull_break(core, state, start_s);
+    note_turn_on(cut.electrical_event);
   }
 }
 
@@ -222,6 +224,7 @@ void DriveTrain<Machine, Shaft>::run(AxisCore& core, AxisState& state, double lo
   x.shaft = shaft_of(state);
   look_up_angle(x.shaft);
   piece_.plain = piece_.open = piece_.stays = piece_.has_switching = false;
+  forget_turn_ons();
   const bool smooth =
       !Machine::kHasCorners && !core.shaft_has_events && !core.follows && state.injected.blocked_rotor == 0.0;
   for (int n = 0; n < core.timing.substeps; ++n) {
@@ -259,6 +262,7 @@ PhaseValues DriveTrain<Machine, Shaft>::run_part(AxisCore& core, AxisState& stat
   x.shaft = shaft_of(state);
   look_up_angle(x.shaft);
   piece_.plain = piece_.open = piece_.stays = piece_.has_switching = false;
+  forget_turn_ons();
   run_piece(core, state, x, start_s, end_s, load_nm);
   const RotorMotion motion = motion_of(x);
   keep_open(core, state, x.machine, motion);
@@ -284,6 +288,7 @@ void DriveTrain<Machine, Shaft>::open(AxisCore& core, AxisState& state, double s
   piece_.from = machine_of(state);
   piece_.stage = piece_.from;
   piece_.plain = piece_.open = piece_.stays = false;
+  if (start_s == 0.0) forget_turn_ons();
   piece_.current_a = currents(core, state, piece_.from, turned(motion));
   connect_piece(core, state, start_s, duration_s, piece_.from, turned(motion));
 }
@@ -347,6 +352,7 @@ void DriveTrain<Machine, Shaft>::close(AxisCore& core, AxisState& state, double 
   const RotorMotion end = turned(to);
   if (event >= 0) settle_terminals(core, state, piece_.stage, end, event);
   if (piece_.watched && event >= first_break_event()) pull_break(core, state, start_s + duration_s);
+  note_turn_on(event);
   keep_open(core, state, piece_.stage, end);
   finish_piece(core, state, {start_s, duration_s, piece_.from, piece_.stage, turned(from), end});
   piece_.current_a = currents(core, state, piece_.stage, end);

@@ -10,7 +10,10 @@ template <class Machine, class Shaft>
 void DriveTrain<Machine, Shaft>::watch_switching(const AxisCore& core, const AxisState& state) noexcept {
   piece_.turning_on = 0;
   piece_.floats_alone = piece_.knows_end = false;
-  if (piece_.off != 0 && watches_diodes(core)) {
+  constexpr int kMaxTurnOns =
+      4;  // a link that moves can carry its rail away from a terminal that has passed it
+  const bool looks = piece_.turn_ons < kMaxTurnOns && state.injected.neutral_short == 0.0;
+  if (looks && piece_.off != 0 && watches_diodes(core)) {
     for (int k = 0; k < terminal_count(core.connection); ++k) {
       const bool diodes = piece_.drive.mode[static_cast<std::size_t>(k)] == TerminalMode::kDiodes;
       if (diodes && (piece_.off & terminal_bit(k)) != 0) piece_.turning_on |= terminal_bit(k);
@@ -104,10 +107,14 @@ void DriveTrain<Machine, Shaft>::add_switching(const AxisCore& core, const AxisS
 }
 
 template <class Machine, class Shaft>
-int DriveTrain<Machine, Shaft>::first_break_event() const noexcept {
+int DriveTrain<Machine, Shaft>::first_turn_on_event() const noexcept {
   const bool corner = Machine::kHasCorners && piece_.corner != kNoCorner;
-  return std::popcount(piece_.circuit.dying) + (corner ? 1 : 0) +
-         (piece_.floats_alone ? 1 : std::popcount(piece_.turning_on));
+  return std::popcount(piece_.circuit.dying) + (corner ? 1 : 0);
+}
+
+template <class Machine, class Shaft>
+int DriveTrain<Machine, Shaft>::first_break_event() const noexcept {
+  return first_turn_on_event() + (piece_.floats_alone ? 1 : std::popcount(piece_.turning_on));
 }
 
 }  // namespace drivebench

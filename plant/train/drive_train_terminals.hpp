@@ -98,6 +98,7 @@ void DriveTrain<Machine, Shaft>::connect_piece(AxisCore& core, AxisState& state,
     }
   }
   piece_.drive = core.drive.at(state.drive, start_s, duration_s, piece_.current_a);
+  piece_.drive.turns_on = piece_.turns_on;
   const TerminalSet all = all_terminals(core.connection);
   const bool sound =
       piece_.drive.constant && state.injected.phase_short == 0.0 && state.injected.neutral_short == 0.0;
@@ -129,7 +130,7 @@ void DriveTrain<Machine, Shaft>::connect_piece(AxisCore& core, AxisState& state,
     watch_switching(core, state);
   } else {
     piece_.turning_on = 0;
-    piece_.has_switching = piece_.watched = false;
+    piece_.floats_alone = piece_.has_switching = piece_.watched = false;
   }
 }
 
@@ -170,7 +171,7 @@ bool DriveTrain<Machine, Shaft>::keeps_circuit(const AxisCore& core, const AxisS
   if (core.connection == Connection::kStar && std::popcount(piece_.off) > 1) return false;
   const ThreePhase v = phases_of(last_v);
   const auto blocks = [&](int k, double terminal_v) noexcept {
-    return (piece_.off & terminal_bit(k)) == 0 || std::abs(terminal_v) <= piece_.drive.clamp_v();
+    return (piece_.off & terminal_bit(k)) == 0 || std::abs(terminal_v) <= piece_.drive.conducts_above_v();
   };
   return blocks(0, v.a) && blocks(1, v.b) && blocks(2, v.c);
 }

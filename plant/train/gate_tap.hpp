@@ -1,5 +1,8 @@
 #pragma once
 
+#include <algorithm>
+
+#include "plant/drive/phases.hpp"
 #include "plant/math/frames.hpp"
 #include "plant/sensors/event_log.hpp"
 
@@ -21,10 +24,23 @@ struct GateSums {
   double shaft_j = 0.0;   ///< onto the shaft
 };
 
-/// What the pieces of a tick report at gate level: see AxisCore::tap.
+/// What the pieces of a part of a tick report at gate level: see AxisCore::tap.
 struct GateTap {
   EventLog events;
-  GateSums sums;
+  GateSums sums;        ///< of all parts
+  ThreePhase lowest_a;  ///< currents of the terminals where pieces of the part end
+  ThreePhase highest_a;
+
+  void begin_part() noexcept {
+    events.clear();
+    constexpr double kBeyondAll = 1e300;
+    lowest_a = {.a = kBeyondAll, .b = kBeyondAll, .c = kBeyondAll};
+    highest_a = {.a = -kBeyondAll, .b = -kBeyondAll, .c = -kBeyondAll};
+  }
+  void add_currents(const ThreePhase& current_a) noexcept {
+    lowest_a = by_phase([](double x, double y) { return std::min(x, y); }, lowest_a, current_a);
+    highest_a = by_phase([](double x, double y) { return std::max(x, y); }, highest_a, current_a);
+  }
 };
 
 }  // namespace drivebench

@@ -15,9 +15,9 @@
 
 namespace drivebench {
 
-// A piece of a tick is cut at each event (a current or a speed reaches zero, the emf has a corner), at most
-// this often.
-inline constexpr std::size_t kMaxEvents = 6;
+// A piece of a tick is cut at each event (a current or a speed reaches zero, a diode begins to conduct, the
+// emf has a corner), at most this often.
+inline constexpr std::size_t kMaxEvents = 10;
 // Edges of the drive in a tick, and the events on the way.
 inline constexpr std::size_t kMaxSegments = kMaxSubsteps * (kMaxEvents + 1) + 256;
 

@@ -62,7 +62,7 @@ class Controller {
     return static_cast<double>(now_ns() - begin) / runs;
   }
 
-  /// A step of the plant: from one change of a leg, point of the grid or edge to the next [ns].
+  /// A step of the plant: from one change of a voltage or point of the grid to the next [ns].
   double step_ns(double seconds, double steps_per_s) {
     const std::int64_t begin = now_ns();
     check(bridge_, drivebench_bridge_run(bridge_, now_ + static_cast<std::uint64_t>(1e12 * seconds), nullptr,
@@ -121,8 +121,9 @@ std::vector<Row> measure_bridge() {
     return 1e-9 * static_cast<double>(now_ns() - begin) / simulated_s;
   });
   const auto idle = undisturbed_rounds(cpu, 10, [&] { return controller.idle_ns(1000); });
-  // Four changes of the leg in a period, and the grid of a step in 20 us.
-  const double steps_per_s = 4e12 / static_cast<double>(kPwmPs) + 50e3;
+  // The leg's voltage moves twice in a period, its dead times lie beside diodes; and a step of the grid in 20
+  // us.
+  const double steps_per_s = 2e12 / static_cast<double>(kPwmPs) + 50e3;
   const auto step = undisturbed_rounds(cpu, 10, [&] { return controller.step_ns(0.001, steps_per_s); });
   return {{.name = "gate level, a run with nothing due",
            .unit = "ns",
