@@ -147,7 +147,6 @@ TEST(TurnOn, ARailThatMovesAwayIsMetAFewTimes) {
     EXPECT_GT(most_a, 4.0);
     EXPECT_LT(error_a, 0.1 * most_a) << diode_v;
     EXPECT_LE(coarse.pieces_per_substep, 5.0) << diode_v;
-
   }
 }
 
