@@ -18,6 +18,17 @@ LegLevel rail_of(LegLevel level, std::int64_t flow) noexcept {
   return flow > 0 ? LegLevel::kLow : LegLevel::kHigh;
 }
 
+/// The instant, `until` at the latest, at which the leg moves its terminal whose current has this sign.
+Picoseconds next_move(LegTimer leg, std::int64_t flow, Picoseconds until) noexcept {
+  const LegLevel rail = rail_of(leg.level(), flow);
+  while (leg.next() < until) {
+    const Picoseconds at = leg.next();
+    leg.go_to(at);
+    if (rail == LegLevel::kOff || rail_of(leg.level(), flow) != rail) return at;
+  }
+  return until;
+}
+
 }  // namespace
 
 double GateAxis::within_tick_s(Picoseconds at) const noexcept {
@@ -42,17 +53,10 @@ GateAxis::Part GateAxis::part_up_to(Picoseconds limit, bool may_join) const noex
   Part part{.to = std::min(limit, grid_after(from))};
   std::array<Picoseconds, 3> change{};
   for (std::size_t k = 0; k < change.size(); ++k) {
-    LegTimer leg = clock_.legs[k];
+    const LegTimer& leg = clock_.legs[k];
     part.levels[k] = leg.level();
-    change[k] = leg.next(from);
-    const LegLevel rail = rail_of(leg.level(), clock_.flow[k]);
-    Picoseconds moves = change[k];
-    while (may_join && rail != LegLevel::kOff && moves < part.to) {
-      leg.go_to(moves);
-      if (rail_of(leg.level(), clock_.flow[k]) != rail) break;
-      moves = leg.next(moves);
-    }
-    part.to = std::min(part.to, moves);
+    change[k] = leg.next();
+    if (change[k] < part.to) part.to = may_join ? next_move(leg, clock_.flow[k], part.to) : change[k];
   }
   for (std::size_t k = 0; k < change.size(); ++k) {
     if (change[k] >= part.to) continue;
@@ -72,8 +76,9 @@ bool GateAxis::run_part(const Part& part) {
   bool flows = true;
   for (std::size_t k = 0; k < clock_.legs.size(); ++k) {
     if ((part.joined >> k & 1U) == 0) continue;
-    for (Picoseconds at = clock_.legs[k].next(from); at < part.to; at = clock_.legs[k].next(at))
-      clock_.legs[k].go_to(at);
+    LegTimer& leg = clock_.legs[k];
+    while (leg.next() < part.to)
+      leg.go_to(leg.next());
     flows = flows && (clock_.flow[k] > 0 ? lowest_a[k] > 0.0 : highest_a[k] < 0.0);
   }
   if (!end_a) return true;

@@ -293,13 +293,15 @@ LimitedVoltages Drive::limited(const DriveMemory& m, Gates gates, const ThreePha
 
 void Drive::drive_terminals(DriveMemory& m, const Order& order, double start_s, const PhaseValues& current_a,
                             TerminalDrive& out) const noexcept {
+  if (kind_ == DriveKind::kSwitched) {
+    put_switches(m, order, start_s, out);
+    if (order.setpoint.field == 0.0) return;
+  }
   const PhaseValues wanted_v = wanted_voltages(m, order, current_a);
   const double field_limit_v = is_inverter() ? m.bus_v : limit_v(m);
   out.field_v = std::clamp(wanted_v.field, -field_limit_v, field_limit_v);
   bool saturated = out.field_v != wanted_v.field && p_.source.field_v == 0.0;
-  if (kind_ == DriveKind::kSwitched) {
-    put_switches(m, order, start_s, out);
-  } else {
+  if (kind_ != DriveKind::kSwitched) {
     const LimitedVoltages v = limited(m, order.gates, phases_of(wanted_v));
     saturated = saturated || v.saturated;
     out.start_v = v.voltage_v;

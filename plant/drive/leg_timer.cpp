@@ -38,7 +38,7 @@ LegLevel LegTimer::wanted(Picoseconds now) const noexcept {
   return setting_.mode == LegMode::kPwm ? LegLevel::kLow : LegLevel::kOff;
 }
 
-void LegTimer::go_to(Picoseconds now) noexcept {
+void LegTimer::change_to(Picoseconds now) noexcept {
   const LegLevel to = wanted(now);
   if (to != wanted_) {
     if (level_ != LegLevel::kOff) opened_[switch_of(level_)] = now;
@@ -47,6 +47,7 @@ void LegTimer::go_to(Picoseconds now) noexcept {
     closes_ = to == LegLevel::kOff ? now : std::max(now, opened_[1 - switch_of(to)] + setting_.dead);
   }
   if (closes_ <= now) level_ = wanted_;
+  next_ = next_after(now);
 }
 
 bool LegTimer::is_possible(Picoseconds now) const noexcept {
@@ -55,10 +56,11 @@ bool LegTimer::is_possible(Picoseconds now) const noexcept {
   };
   const auto has_been = [now](Picoseconds at) noexcept { return at >= kLongAgo && at <= now; };
   return drivebench::is_possible(setting_) && is_level(wanted_) && is_level(level_) && has_been(opened_[0]) &&
-         has_been(opened_[1]) && closes_ >= kLongAgo && closes_ <= now + LegSetting::kLongestDead;
+         has_been(opened_[1]) && closes_ >= kLongAgo && closes_ <= now + LegSetting::kLongestDead &&
+         (next_ == now || next_ == next_after(now));
 }
 
-Picoseconds LegTimer::next(Picoseconds now) const noexcept {
+Picoseconds LegTimer::next_after(Picoseconds now) const noexcept {
   Picoseconds next = closes_ > now ? closes_ : kNever;
   if (!switches()) return next;
   const Picoseconds at = phase(now);

@@ -51,23 +51,27 @@ class LegTimer {
   /// From `now` on.
   void set(const LegSetting& setting, Picoseconds now) noexcept {
     setting_ = setting;
-    go_to(now);
+    change_to(now);
   }
   const LegSetting& setting() const noexcept { return setting_; }
 
   /// Goes on to `now`, which is not beyond next().
-  void go_to(Picoseconds now) noexcept;
+  void go_to(Picoseconds now) noexcept {
+    if (now >= next_) change_to(now);
+  }
   /// What the leg is at from the last go_to() to next().
   LegLevel level() const noexcept { return level_; }
-  /// The instant after `now` of the next change; kNever if there is none.
-  Picoseconds next(Picoseconds now) const noexcept;
+  /// The instant of the next change; kNever if there is none.
+  Picoseconds next() const noexcept { return next_; }
   /// Whether a timer can have come to this at `now`: for one from bytes.
   bool is_possible(Picoseconds now) const noexcept;
 
  private:
   static constexpr Picoseconds kLongAgo = -(Picoseconds{1} << 62);
 
+  void change_to(Picoseconds now) noexcept;
   LegLevel wanted(Picoseconds now) const noexcept;
+  Picoseconds next_after(Picoseconds now) const noexcept;
   bool switches() const noexcept {
     return setting_.mode >= LegMode::kPwm && setting_.compare > 0 && setting_.compare < setting_.period;
   }
@@ -83,6 +87,7 @@ class LegTimer {
   LegLevel level_ = LegLevel::kOff;
   Picoseconds closes_ = 0;                                 ///< what is wanted
   std::array<Picoseconds, 2> opened_{kLongAgo, kLongAgo};  ///< lower and upper switch, last
+  Picoseconds next_ = kNever;
 };
 
 }  // namespace drivebench
