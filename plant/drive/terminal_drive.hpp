@@ -7,6 +7,9 @@
 
 namespace drivebench {
 
+/// A set of terminals: bit 0 is a, bit 1 b, bit 2 c.
+using TerminalSet = std::uint64_t;
+
 /// The connection of a terminal during an interval.
 enum class TerminalMode : std::int64_t {
   kDriven,  ///< a voltage
@@ -26,19 +29,19 @@ struct TerminalDrive {
   double link_rise_v = 0.0;  ///< by which the link is above that at the end of the interval
   bool link_moves = false;   ///< the rails are those of this interval alone
   double field_v = 0.0;
-  double diode_v = 0.0;     ///< forward voltage of the diodes between a terminal and a rail
-  double switch_ohm = 0.0;  ///< of the closed switches between a driven terminal and its voltage
-  bool turns_on = false;    ///< the interval before ended where a floating terminal begins to conduct
+  double diode_v = 0.0;      ///< forward voltage of the diodes between a terminal and a rail
+  double switch_ohm = 0.0;   ///< of the closed switches between a driven terminal and its voltage
+  TerminalSet turns_on = 0;  ///< floating terminals that began to conduct where the interval before ended
 
   /// Diodes clamp to plus and minus this.
   constexpr double clamp_v() const noexcept { return rail_v + diode_v; }
-  /// A floating terminal that passes this within an interval ends it, and conducts from then on.
+  /// Where a floating terminal passes this, the interval ends.
   constexpr double turns_on_at_v() const noexcept { return clamp_v() * (1.0 + 1e-12); }
-  /// One that is beyond this at the start of an interval conducts: rounding that leaves it at the rail does
-  /// not let it begin, nor does rounding, or a link that has moved a little, keep it from beginning where it
-  /// has passed turns_on_at_v().
-  constexpr double conducts_above_v() const noexcept {
-    return clamp_v() * (turns_on ? 1.0 - 1e-6 : 1.0 + 5e-13);
+  /// Beyond this it conducts from the start of an interval on. A terminal that rounding puts on its rail does
+  /// not; one that has passed turns_on_at_v() does although its rail may have moved on a little.
+  constexpr double conducts_above_v(TerminalSet terminals) const noexcept {
+    constexpr double kMovedOn = 1e-2;
+    return clamp_v() * ((turns_on & terminals) != 0 ? 1.0 - kMovedOn : 1.0 + 5e-13);
   }
 };
 

@@ -105,7 +105,8 @@ bool start_rectifier(Work& w, const Phases& winding_v) noexcept {
     if (high < 0 || winding_v[at(k)] > winding_v[at(high)]) high = k;
     if (low < 0 || winding_v[at(k)] < winding_v[at(low)]) low = k;
   }
-  if (high < 0 || high == low || winding_v[at(high)] - winding_v[at(low)] <= 2.0 * w.drive.conducts_above_v())
+  if (high < 0 || high == low ||
+      winding_v[at(high)] - winding_v[at(low)] <= 2.0 * w.drive.conducts_above_v(all_terminals(w.connection)))
     return false;
   clamp_terminal(w, high, 1.0);
   clamp_terminal(w, low, -1.0);
@@ -124,7 +125,8 @@ bool float_once(Work& w) noexcept {
     if (w.conducts(k)) continue;
     const double floating_v = neutral_v + winding_v[at(k)];
     w.voltage_v[at(k)] = floating_v;
-    if (!w.has_diodes(k) || alone || std::abs(floating_v) <= w.drive.conducts_above_v()) continue;
+    if (!w.has_diodes(k) || alone || std::abs(floating_v) <= w.drive.conducts_above_v(terminal_bit(k)))
+      continue;
     clamp_terminal(w, k, floating_v > 0.0 ? 1.0 : -1.0);
     return true;
   }
@@ -319,7 +321,7 @@ PhaseValues behind_switches(Connection connection, const TerminalDrive& drive, c
 bool diodes_block(Connection connection, const TerminalDrive& drive,
                   const WindingValues& open_circuit_v) noexcept {
   const Phases emf_v = winding_phases(connection, open_circuit_v);
-  const double most_v = drive.conducts_above_v();
+  const double most_v = drive.conducts_above_v(all_terminals(connection));
   double highest_v = -most_v;
   double lowest_v = most_v;
   for (int k = 0; k < terminal_count(connection); ++k) {

@@ -11,9 +11,6 @@
 
 namespace drivebench {
 
-/// A set of terminals: bit 0 is a, bit 1 b, bit 2 c.
-using TerminalSet = std::uint64_t;
-
 /// The set of terminal k alone.
 constexpr TerminalSet terminal_bit(int k) noexcept {
   return TerminalSet{1} << k;

@@ -38,8 +38,8 @@ class DriveTrain final : public Train {
     return drivebench::stored_energy_j(c_, machine_of(state), turned(motion));
   }
 
-  void open(AxisCore& core, AxisState& state, double start_s, double duration_s,
-            const RotorMotion& motion) noexcept override;
+  void open(AxisCore& core, AxisState& state, double start_s, double duration_s, const RotorMotion& motion,
+            bool is_first) noexcept override;
   double torque_nm_at(PieceEnd end, const RotorMotion& motion) const noexcept override {
     return torque_nm(c_, end == PieceEnd::kStart ? piece_.from : piece_.stage, turned(motion));
   }
@@ -82,8 +82,8 @@ class DriveTrain final : public Train {
     bool floats_alone = false;   ///< and no terminal of the star is held
     bool knows_end = false;      ///< end_v has been asked for
     PhaseValues end_v{};         ///< with turning_on: the terminals where the piece has come to
-    bool turns_on = false;       ///< the piece before ended where a diode begins to conduct
-    int turn_ons = 0;            ///< such ends since a piece ended at no event
+    TerminalSet turns_on = 0;    ///< terminals that began to conduct where the piece before ended
+    int turn_ons = 0;            ///< such ends in this substep
     bool watched = false;        ///< by the break input
   };
 
@@ -180,14 +180,13 @@ class DriveTrain final : public Train {
   /// and before those of the break input.
   int first_break_event() const noexcept;
   /// What has ended the piece, for the next one.
-  void note_turn_on(int electrical_event) noexcept {
-    piece_.turns_on = piece_.turning_on != 0 && electrical_event >= first_turn_on_event() &&
-                      electrical_event < first_break_event();
-    if (piece_.turns_on) ++piece_.turn_ons;
-    if (electrical_event < 0) piece_.turn_ons = 0;
-  }
+  void note_turn_on(int electrical_event) noexcept;
+  /// A diode that has begun with the piece and has a current against its direction at its end, because its
+  /// rail has moved on, has none.
+  [[gnu::noinline]] void stop_backward(const AxisCore& core, AxisState& state, State& x,
+                                       const RotorMotion& motion) const noexcept;
   void forget_turn_ons() noexcept {
-    piece_.turns_on = false;
+    piece_.turns_on = 0;
     piece_.turn_ons = 0;
   }
   /// Makes it a circuit of constant voltages in which no current dies.

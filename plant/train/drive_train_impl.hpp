@@ -131,6 +131,7 @@ void DriveTrain<Machine, Shaft>::run_piece(AxisCore& core, AxisState& state, Who
                                            double end_s, double load_nm) noexcept {
   const bool blocked = state.injected.blocked_rotor != 0.0;
   Freed freed;
+  forget_turn_ons();
   for (std::size_t events = 0; start_s < end_s; ++events) {
     if (core.shaft_has_events || blocked) x.shaft = locked(core.shaft, x.shaft, blocked);
     const Whole from = x;
@@ -164,6 +165,7 @@ void DriveTrain<Machine, Shaft>::run_piece(AxisCore& core, AxisState& state, Who
         settle_terminals(core, state, x.machine, motion_of(x), cut.electrical_event);
       }
     }
+    if (piece_.turns_on != 0) stop_backward(core, state, x.machine, motion_of(x));
     freed = cut.freed;
     const double passed_s = cut.fraction < 1.0 ? cut.fraction * duration_s : duration_s;
     finish_piece(core, state, {start_s, passed_s, from.machine, x.machine, from_motion, motion_of(x)});
@@ -224,7 +226,6 @@ void DriveTrain<Machine, Shaft>::run(AxisCore& core, AxisState& state, double lo
   x.shaft = shaft_of(state);
   look_up_angle(x.shaft);
   piece_.plain = piece_.open = piece_.stays = piece_.has_switching = false;
-  forget_turn_ons();
   const bool smooth =
       !Machine::kHasCorners && !core.shaft_has_events && !core.follows && state.injected.blocked_rotor == 0.0;
   for (int n = 0; n < core.timing.substeps; ++n) {
@@ -262,7 +263,6 @@ PhaseValues DriveTrain<Machine, Shaft>::run_part(AxisCore& core, AxisState& stat
   x.shaft = shaft_of(state);
   look_up_angle(x.shaft);
   piece_.plain = piece_.open = piece_.stays = piece_.has_switching = false;
-  forget_turn_ons();
   run_piece(core, state, x, start_s, end_s, load_nm);
   const RotorMotion motion = motion_of(x);
   keep_open(core, state, x.machine, motion);
@@ -284,11 +284,11 @@ void DriveTrain<Machine, Shaft>::end_run(const AxisCore& core, AxisState& state,
 
 template <class Machine, class Shaft>
 void DriveTrain<Machine, Shaft>::open(AxisCore& core, AxisState& state, double start_s, double duration_s,
-                                      const RotorMotion& motion) noexcept {
+                                      const RotorMotion& motion, bool is_first) noexcept {
   piece_.from = machine_of(state);
   piece_.stage = piece_.from;
   piece_.plain = piece_.open = piece_.stays = false;
-  if (start_s == 0.0) forget_turn_ons();
+  if (is_first) forget_turn_ons();
   piece_.current_a = currents(core, state, piece_.from, turned(motion));
   connect_piece(core, state, start_s, duration_s, piece_.from, turned(motion));
 }
@@ -351,6 +351,7 @@ void DriveTrain<Machine, Shaft>::close(AxisCore& core, AxisState& state, double 
                                        const RotorMotion& from, const RotorMotion& to, int event) noexcept {
   const RotorMotion end = turned(to);
   if (event >= 0) settle_terminals(core, state, piece_.stage, end, event);
+  if (piece_.turns_on != 0) stop_backward(core, state, piece_.stage, end);
   if (piece_.watched && event >= first_break_event()) pull_break(core, state, start_s + duration_s);
   note_turn_on(event);
   keep_open(core, state, piece_.stage, end);

@@ -10,9 +10,9 @@ template <class Machine, class Shaft>
 void DriveTrain<Machine, Shaft>::watch_switching(const AxisCore& core, const AxisState& state) noexcept {
   piece_.turning_on = 0;
   piece_.floats_alone = piece_.knows_end = false;
-  constexpr int kMaxTurnOns =
-      4;  // a link that moves can carry its rail away from a terminal that has passed it
-  const bool looks = piece_.turn_ons < kMaxTurnOns && state.injected.neutral_short == 0.0;
+  constexpr int kMaxTurnOns = 2;  // the rest of the events are for currents that die
+  const bool shorted = state.injected.phase_short != 0.0 || state.injected.neutral_short != 0.0;
+  const bool looks = piece_.turn_ons < kMaxTurnOns && !shorted;
   if (looks && piece_.off != 0 && watches_diodes(core)) {
     for (int k = 0; k < terminal_count(core.connection); ++k) {
       const bool diodes = piece_.drive.mode[static_cast<std::size_t>(k)] == TerminalMode::kDiodes;
@@ -115,6 +115,31 @@ int DriveTrain<Machine, Shaft>::first_turn_on_event() const noexcept {
 template <class Machine, class Shaft>
 int DriveTrain<Machine, Shaft>::first_break_event() const noexcept {
   return first_turn_on_event() + (piece_.floats_alone ? 1 : std::popcount(piece_.turning_on));
+}
+
+template <class Machine, class Shaft>
+void DriveTrain<Machine, Shaft>::note_turn_on(int electrical_event) noexcept {
+  piece_.turns_on = 0;
+  const int first = first_turn_on_event();
+  if (piece_.turning_on == 0 || electrical_event < first || electrical_event >= first_break_event()) return;
+  ++piece_.turn_ons;
+  piece_.turns_on = piece_.floats_alone
+                        ? piece_.turning_on
+                        : terminal_bit(nth_terminal(piece_.turning_on, electrical_event - first));
+}
+
+template <class Machine, class Shaft>
+void DriveTrain<Machine, Shaft>::stop_backward(const AxisCore& core, AxisState& state, State& x,
+                                               const RotorMotion& motion) const noexcept {
+  ThreePhase begun_a = phases_of(piece_.current_a);
+  ThreePhase now_a = phases_of(currents(core, state, x, motion));
+  ThreePhase clamp_v = phases_of(piece_.circuit.start_v);
+  for (int k = 0; k < 3; ++k) {
+    const bool begins = (piece_.circuit.dying & terminal_bit(k)) != 0 && phase(begun_a, k) == 0.0;
+    if (!begins || phase(now_a, k) * phase(clamp_v, k) <= 0.0) continue;
+    state.open_terminals = opened(core.connection, state.open_terminals, k);
+    x = restricted(c_, x, motion, open_input(core.connection, state.open_terminals));
+  }
 }
 
 }  // namespace drivebench

@@ -61,7 +61,8 @@ bool DriveTrain<Machine, Shaft>::leave_open(const AxisCore& core, const State& x
   const WindingValues emf_v = open_v(x, motion);
   // No phase has more than the sum of the components.
   const double most_v = std::abs(emf_v.stator.a) + std::abs(emf_v.stator.b) + std::abs(emf_v.zero);
-  if (most_v > piece_.drive.rail_v && !diodes_block(core.connection, piece_.drive, emf_v)) return false;
+  const bool may_conduct = most_v > piece_.drive.rail_v || piece_.drive.turns_on != 0;
+  if (may_conduct && !diodes_block(core.connection, piece_.drive, emf_v)) return false;
   if (core.follows) {
     piece_.circuit.start_v = open_terminal_voltages(core.connection, emf_v, piece_.drive.field_v);
     piece_.circuit.mean_v = piece_.circuit.start_v;
@@ -79,6 +80,7 @@ PhaseValues DriveTrain<Machine, Shaft>::end_voltages(const AxisCore& core, const
     return open_terminal_voltages(core.connection, open_v(x, motion), piece_.drive.field_v);
   }
   TerminalDrive drive = piece_.drive;
+  drive.turns_on = 0;
   if (!drive.constant) drive.start_v = drive.end_v;
   const auto ask = [&](const TerminalInput& u) noexcept { return floating_v(x, motion, u); };
   return connected_voltages(core.connection, drive, state.injected, piece_.current_a, WindingVoltagesOf(ask),
@@ -171,7 +173,8 @@ bool DriveTrain<Machine, Shaft>::keeps_circuit(const AxisCore& core, const AxisS
   if (core.connection == Connection::kStar && std::popcount(piece_.off) > 1) return false;
   const ThreePhase v = phases_of(last_v);
   const auto blocks = [&](int k, double terminal_v) noexcept {
-    return (piece_.off & terminal_bit(k)) == 0 || std::abs(terminal_v) <= piece_.drive.conducts_above_v();
+    return (piece_.off & terminal_bit(k)) == 0 ||
+           std::abs(terminal_v) <= piece_.drive.conducts_above_v(terminal_bit(k));
   };
   return blocks(0, v.a) && blocks(1, v.b) && blocks(2, v.c);
 }

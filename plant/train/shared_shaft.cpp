@@ -129,8 +129,8 @@ void SharedShaft::run_piece(Shaft& x, double start_s, double end_s, double load_
     const double duration_s = stop_s - start_s;
     x = locked(first_.core.shaft, x, is_blocked(first_), is_blocked(second_));
     const Shaft from = x;
-    first_.train.open(first_.core, first_.state, start_s, duration_s, first_motion(from));
-    second_.train.open(second_.core, second_.state, start_s, duration_s, second_motion(from));
+    first_.train.open(first_.core, first_.state, start_s, duration_s, first_motion(from), events == 0);
+    second_.train.open(second_.core, second_.state, start_s, duration_s, second_motion(from), events == 0);
     const ShaftBranch branch = branch_at(from, load_nm, freed);
     x = stepped(from, duration_s, branch, load_nm);
     Cut cut;

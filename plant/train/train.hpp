@@ -91,9 +91,9 @@ class Train {
   // both and stage() of both, then find_corner() and add_events(); shorten() and the stages again until an
   // event is found; then close().
 
-  /// Connects drive and windings for a piece of the tick.
+  /// Connects drive and windings for a piece of the tick, the first of a substep or a later one.
   virtual void open(AxisCore& core, AxisState& state, double start_s, double duration_s,
-                    const RotorMotion& motion) noexcept = 0;
+                    const RotorMotion& motion, bool is_first) noexcept = 0;
   virtual double torque_nm_at(PieceEnd end, const RotorMotion& motion) const noexcept = 0;
   /// Stage 0 to 3 of a Runge-Kutta step.
   virtual void stage(int number, double duration_s, const RotorMotion& motion) noexcept = 0;
