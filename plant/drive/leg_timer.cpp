@@ -55,9 +55,13 @@ bool LegTimer::is_possible(Picoseconds now) const noexcept {
     return level == LegLevel::kOff || level == LegLevel::kLow || level == LegLevel::kHigh;
   };
   const auto has_been = [now](Picoseconds at) noexcept { return at >= kLongAgo && at <= now; };
+  const auto stays = [&] {
+    return wanted_ == wanted(now) && level_ == (closes_ <= now ? wanted_ : LegLevel::kOff) &&
+           next_ == next_after(now);
+  };
   return drivebench::is_possible(setting_) && is_level(wanted_) && is_level(level_) && has_been(opened_[0]) &&
          has_been(opened_[1]) && closes_ >= kLongAgo && closes_ <= now + LegSetting::kLongestDead &&
-         (next_ == now || next_ == next_after(now));
+         (next_ == now || stays());
 }
 
 Picoseconds LegTimer::next_after(Picoseconds now) const noexcept {

@@ -82,8 +82,8 @@ class DriveTrain final : public Train {
     bool floats_alone = false;   ///< and no terminal of the star is held
     bool knows_end = false;      ///< end_v has been asked for
     PhaseValues end_v{};         ///< with turning_on: the terminals where the piece has come to
-    TerminalSet turns_on = 0;    ///< terminals that began to conduct where the piece before ended
-    int turn_ons = 0;            ///< such ends in this substep
+    TerminalSet turns_on = 0;    ///< terminals that may have begun where the piece before ended
+    int turn_ons = 0;            ///< such ends since the last end of a substep or edge
     bool watched = false;        ///< by the break input
   };
 
@@ -181,8 +181,8 @@ class DriveTrain final : public Train {
   int first_break_event() const noexcept;
   /// What has ended the piece, for the next one.
   void note_turn_on(int electrical_event) noexcept;
-  /// A diode that has begun with the piece and has a current against its direction at its end, because its
-  /// rail has moved on, has none.
+  /// A diode that has begun with the piece and has a current against its direction at its end has none: its
+  /// rail has moved on, or its pulse was shorter.
   [[gnu::noinline]] void stop_backward(const AxisCore& core, AxisState& state, State& x,
                                        const RotorMotion& motion) const noexcept;
   void forget_turn_ons() noexcept {

@@ -165,12 +165,13 @@ void DriveTrain<Machine, Shaft>::run_piece(AxisCore& core, AxisState& state, Who
         settle_terminals(core, state, x.machine, motion_of(x), cut.electrical_event);
       }
     }
+    const TerminalSet died = state.open_terminals & ~open_before;
     if (piece_.turns_on != 0) stop_backward(core, state, x.machine, motion_of(x));
     freed = cut.freed;
     const double passed_s = cut.fraction < 1.0 ? cut.fraction * duration_s : duration_s;
     finish_piece(core, state, {start_s, passed_s, from.machine, x.machine, from_motion, motion_of(x)});
     start_s = cut.fraction < 1.0 ? start_s + passed_s : stop_s;
-    if (core.tap != nullptr) tell_deaths(core, state.open_terminals & ~open_before, start_s);
+    if (core.tap != nullptr) tell_deaths(core, died, start_s);
     if (piece_.watched && cut.electrical_event >= first_break_event()) pull_break(core, state, start_s);
     note_turn_on(cut.electrical_event);
   }

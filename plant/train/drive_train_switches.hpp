@@ -132,10 +132,10 @@ template <class Machine, class Shaft>
 void DriveTrain<Machine, Shaft>::stop_backward(const AxisCore& core, AxisState& state, State& x,
                                                const RotorMotion& motion) const noexcept {
   ThreePhase begun_a = phases_of(piece_.current_a);
-  ThreePhase now_a = phases_of(currents(core, state, x, motion));
   ThreePhase clamp_v = phases_of(piece_.circuit.start_v);
   for (int k = 0; k < 3; ++k) {
     const bool begins = (piece_.circuit.dying & terminal_bit(k)) != 0 && phase(begun_a, k) == 0.0;
+    ThreePhase now_a = phases_of(currents(core, state, x, motion));
     if (!begins || phase(now_a, k) * phase(clamp_v, k) <= 0.0) continue;
     state.open_terminals = opened(core.connection, state.open_terminals, k);
     x = restricted(c_, x, motion, open_input(core.connection, state.open_terminals));

@@ -91,7 +91,7 @@ class Train {
   // both and stage() of both, then find_corner() and add_events(); shorten() and the stages again until an
   // event is found; then close().
 
-  /// Connects drive and windings for a piece of the tick, the first of a substep or a later one.
+  /// Connects drive and windings for a piece of the tick, the first from a substep or edge on or a later one.
   virtual void open(AxisCore& core, AxisState& state, double start_s, double duration_s,
                     const RotorMotion& motion, bool is_first) noexcept = 0;
   virtual double torque_nm_at(PieceEnd end, const RotorMotion& motion) const noexcept = 0;

@@ -21,6 +21,8 @@ AxisParameters heavy_motor() {
   return p;
 }
 
+constexpr auto kAnyState = [](const AxisState&) noexcept { return true; };
+
 /// With a limit of the bootstrap that it never meets: its parts end at each change of a leg.
 AxisParameters with_single_parts(AxisParameters p) {
   p.drive.inverter.bootstrap_s = 1e3;
@@ -48,7 +50,7 @@ struct Pair {
 
 // Random settings of the legs: PWM with dead times from 0.1 to 4 us, at currents of both signs that die and
 // come back. Catches: a leg that is held beyond the death of its current, a timer whose dead time counts from
-// another change, a rail on the wrong side.
+// another change, a rail on the wrong side, a saved state that is refused.
 TEST(GateParts, JoinedPartsAreAsGoodAsSingleOnes) {
   for (unsigned seed = 0; seed < 5; ++seed) {
     Pair pair(heavy_motor());
@@ -65,6 +67,7 @@ TEST(GateParts, JoinedPartsAreAsGoodAsSingleOnes) {
       setting.centred = static_cast<std::uint32_t>(random() % 2);
       pair.set([&](GateAxis& axis) { axis.set_leg(leg, setting); });
       pair.run(pair.joined.axis.now() + static_cast<Picoseconds>(between(1e6, 200e6)));
+      ASSERT_TRUE(pair.joined.axis.restore(pair.joined.axis.save(), kAnyState)) << seed << " " << n;
       const GateAxis::Now a = pair.joined.axis.look();
       const GateAxis::Now b = pair.single.axis.look();
       most_a = std::max(most_a, std::abs(a.truth.current_a.a));

@@ -158,7 +158,7 @@ TEST(TurnOn, ARailThatMovesAwayIsMetOnce) {
   }
 }
 
-// At many speeds, 0.01 rad apart: where a diode begins shortly before the end of a step its rail may still be
+// At many speeds and angles: where a diode begins shortly before the end of a step its rail may still be
 // moving on. Catches: a current that is left against the direction of its diode there.
 TEST(TurnOn, CurrentsGoTheWayOfTheirDiodes) {
   for (int n = 60; n < 90; ++n) {
