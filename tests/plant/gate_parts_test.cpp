@@ -2,7 +2,10 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
+#include <bit>
 #include <cmath>
+#include <cstdint>
 #include <random>
 
 #include "plant/gate_axis.hpp"
@@ -118,6 +121,30 @@ TEST(GateParts, ABatteryFeedsJoinedLegs) {
   const GateAxis::Now b = pair.single.axis.look();
   EXPECT_NEAR(a.truth.current_a.a, b.truth.current_a.a, 5e-4);
   EXPECT_NEAR(a.state.drive.bus_v, b.state.drive.bus_v, 5e-4);
+}
+
+// Catches: restored bytes of a timer that never changes its leg again, or that holds it where its setting
+// does not.
+TEST(GateParts, ATimerThatWouldStayWrongIsRefused) {
+  using Words = std::array<std::int64_t, sizeof(LegTimer) / 8>;
+  LegTimer timer;
+  timer.set(pwm(0.4), 0);
+  const Picoseconds now = kMicro;
+  ASSERT_TRUE(timer.is_possible(now));
+  ASSERT_TRUE(timer.is_possible(timer.next())) << "it changes at that instant";
+  for (const Picoseconds next : {LegTimer::kNever, timer.next() + 1, now - 1}) {
+    Words words = std::bit_cast<Words>(timer);
+    ASSERT_EQ(words.back(), timer.next());
+    words.back() = next;
+    EXPECT_FALSE(std::bit_cast<LegTimer>(words).is_possible(now)) << next;
+  }
+  LegTimer low;
+  low.set({.mode = LegMode::kLow}, 0);
+  Words words = std::bit_cast<Words>(low);
+  LegTimer high;
+  high.set({.mode = LegMode::kHigh}, 0);
+  words[0] = std::bit_cast<Words>(high)[0];  // the setting alone
+  EXPECT_FALSE(std::bit_cast<LegTimer>(words).is_possible(now));
 }
 
 }  // namespace
