@@ -63,15 +63,17 @@ auto DriveTrain<Machine, Shaft>::cut_at_event(AxisCore& core, AxisState& state, 
       piece_.knows_end = piece_.turning_on != 0;
       if (piece_.knows_end) piece_.end_v = floating_within(core, x.machine, motion_of(x));
     }
-    return found_at(x, dying != 0 ? currents(core, state, x.machine, motion_of(x)) : PhaseValues{},
+    return found_at(x, dying != 0 ? dying_now(core, state, x.machine, motion_of(x)) : PhaseValues{},
                     piece_.end_v);
   };
   PhaseValues begun_v{};
   if constexpr (kSwitching) begun_v = first_v(core, from.machine, motion_of(from));
-  const EventValues before = found_at(from, piece_.current_a, begun_v);
+  const EventValues before = found_at(from, dying_at_start(), begun_v);
+  piece_.part = 1.0;
   const Crossing crossing = located_event(before, values(to), [&](double fraction) noexcept {
     const double shorter_s = fraction * duration_s;
     reconnect_piece(core, state, start_s, shorter_s, from.machine, motion_of(from));
+    piece_.part = fraction;
     to = from;
     step(core, to, shorter_s, branch, load_nm);
     return values(to);

@@ -123,20 +123,68 @@ void DriveTrain<Machine, Shaft>::note_turn_on(int electrical_event) noexcept {
   const int first = first_turn_on_event();
   if (piece_.turning_on == 0 || electrical_event < first || electrical_event >= first_break_event()) return;
   ++piece_.turn_ons;
-  piece_.turns_on = piece_.floats_alone
-                        ? piece_.turning_on
-                        : terminal_bit(nth_terminal(piece_.turning_on, electrical_event - first));
+  if (!piece_.floats_alone) {
+    piece_.turns_on = terminal_bit(nth_terminal(piece_.turning_on, electrical_event - first));
+    return;
+  }
+  ThreePhase v = phases_of(piece_.end_v);
+  int high = nth_terminal(piece_.turning_on, 0);
+  int low = high;
+  for (int k = high + 1; k < 3; ++k) {
+    if ((piece_.turning_on & terminal_bit(k)) == 0) continue;
+    if (phase(v, k) > phase(v, high)) high = k;
+    if (phase(v, k) < phase(v, low)) low = k;
+  }
+  piece_.turns_on = terminal_bit(high) | terminal_bit(low);
+}
+
+template <class Machine, class Shaft>
+void DriveTrain<Machine, Shaft>::note_begun(const AxisCore& core, const AxisState& state, const State& x,
+                                            const RotorMotion& motion, double duration_s) noexcept {
+  piece_.begun = 0;
+  if (piece_.circuit.dying == 0 || state.injected.phase_short != 0.0 || state.injected.neutral_short != 0.0)
+    return;
+  ThreePhase start_a = phases_of(piece_.current_a);
+  for (int k = 0; k < 3; ++k) {
+    if ((piece_.circuit.dying & terminal_bit(k)) != 0 && phase(start_a, k) == 0.0)
+      piece_.begun |= terminal_bit(k);
+  }
+  if (piece_.begun == 0) return;
+  const TerminalInput u =
+      piece_.switch_ohm == 0.0 ? piece_.circuit.start : input_behind_switches(core.connection, x, motion);
+  const State ahead = advanced(x, duration_s, derivative(c_, x, motion, u));
+  piece_.rise_a = currents(core, state, ahead, motion);
+  const auto forward = [](double i_a, double clamp_v) noexcept { return i_a * clamp_v < 0.0 ? i_a : 0.0; };
+  piece_.rise_a = by_terminal(forward, piece_.rise_a, piece_.circuit.start_v);
+}
+
+template <class Machine, class Shaft>
+PhaseValues DriveTrain<Machine, Shaft>::dying_at_start() const noexcept {
+  PhaseValues i = piece_.current_a;
+  if ((piece_.begun & 1u) != 0) i.a = piece_.rise_a.a;
+  if ((piece_.begun & 2u) != 0) i.b = piece_.rise_a.b;
+  if ((piece_.begun & 4u) != 0) i.c = piece_.rise_a.c;
+  return i;
+}
+
+template <class Machine, class Shaft>
+PhaseValues DriveTrain<Machine, Shaft>::dying_now(const AxisCore& core, const AxisState& state,
+                                                  const State& x, const RotorMotion& motion) const noexcept {
+  PhaseValues i = currents(core, state, x, motion);
+  if ((piece_.begun & 1u) != 0) i.a /= piece_.part;
+  if ((piece_.begun & 2u) != 0) i.b /= piece_.part;
+  if ((piece_.begun & 4u) != 0) i.c /= piece_.part;
+  return i;
 }
 
 template <class Machine, class Shaft>
 void DriveTrain<Machine, Shaft>::stop_backward(const AxisCore& core, AxisState& state, State& x,
                                                const RotorMotion& motion) const noexcept {
-  ThreePhase begun_a = phases_of(piece_.current_a);
   ThreePhase clamp_v = phases_of(piece_.circuit.start_v);
   for (int k = 0; k < 3; ++k) {
-    const bool begins = (piece_.circuit.dying & terminal_bit(k)) != 0 && phase(begun_a, k) == 0.0;
+    if ((piece_.begun & terminal_bit(k)) == 0) continue;
     ThreePhase now_a = phases_of(currents(core, state, x, motion));
-    if (!begins || phase(now_a, k) * phase(clamp_v, k) <= 0.0) continue;
+    if (phase(now_a, k) * phase(clamp_v, k) <= 0.0) continue;
     state.open_terminals = opened(core.connection, state.open_terminals, k);
     x = restricted(c_, x, motion, open_input(core.connection, state.open_terminals));
   }

@@ -91,7 +91,8 @@ TEST(MonteCarlo, EachExperimentHasItsOwnNoise) {
 
 // Catches: a comparison that is content with another number, another text, a row less or a row more, and a
 // summary that counts wrong: of the errors 1, 2, 2, 4 % with an interval of 3 % and one estimate taken back
-// the median is 2 %, the worst 4 %, three of four are covered.
+// the median is 2 %, the worst 4 %, three of four are covered. The median interval is 1.5 times that error;
+// that of exact intervals of one width is 1.96/0.6745 = 2.91 times theirs.
 TEST(MonteCarlo, DifferencesAreFound) {
   const auto finding = [](double error, bool stated) {
     return Finding{.truth = 2.0,
@@ -116,7 +117,7 @@ TEST(MonteCarlo, DifferencesAreFound) {
   trials.findings.push_back({finding(0.02, true)});
   const std::string text = markdown_of({trials}, {});
   EXPECT_NE(text.find("| R | 1 to 4 ohm | 4.00 % | 8.00 % | 75.0 % | 2.00 % | 4.00 % | 4.00 % (no. 3) | 75.0 "
-                      "% | 3.00 % | 1 |"),
+                      "% | 3.00 % | 1.50 (2.91) | 1 |"),
             std::string::npos)
       << text;
   EXPECT_NE(text.find("| 4 | 2: not stated |"), std::string::npos) << text;
