@@ -85,11 +85,8 @@ class DriveTrain final : public Train {
     TerminalSet turns_on = 0;    ///< terminals that may have begun where the piece before ended
     int turn_ons = 0;            ///< such ends since the last end of a substep or edge
     bool watched = false;        ///< by the break input
-    // With diodes that begin to conduct where the piece begins:
-    TerminalSet begun = 0;  ///< their terminals, which start from no current at all
-    PhaseValues rise_a{};   ///< their currents at its end if they went on as they start; 0: against the diode
-    double whole_s = 0.0;   ///< of the stages: the piece that was opened,
-    double part = 1.0;      ///< and the part of the piece after which its events are asked for
+    TerminalSet begun = 0;       ///< terminals whose diodes begin with the piece, from no current at all,
+    TerminalSet rising = 0;      ///< and those of them whose currents start in the direction of the diode
   };
 
   /// The part of a piece up to its first event.
@@ -186,14 +183,12 @@ class DriveTrain final : public Train {
   int first_break_event() const noexcept;
   /// What has ended the piece, for the next one.
   void note_turn_on(int electrical_event) noexcept;
-  /// The diodes that begin with a piece of this length from this state of the machine.
-  void note_begun(const AxisCore& core, const AxisState& state, const State& x, const RotorMotion& motion,
-                  double duration_s) noexcept;
-  /// What stands for the dying currents among the values of events: the currents, but those that start from
-  /// zero over the part of the piece that has passed, which are zero where they end and not where they start.
-  PhaseValues dying_at_start() const noexcept;
-  PhaseValues dying_now(const AxisCore& core, const AxisState& state, const State& x,
-                        const RotorMotion& motion) const noexcept;
+  /// The diodes that begin with the piece, from this state of the machine.
+  void note_begun(const AxisCore& core, const AxisState& state, const State& x,
+                  const RotorMotion& motion) noexcept;
+  /// The dying currents at the start of the piece as values of events, where its end has these: a current
+  /// that starts from zero and has turned against its diode stands there as if it came from its mirror image.
+  PhaseValues dying_at_start(const PhaseValues& end_a) const noexcept;
   /// A diode that has begun with the piece and has a current against its direction at its end has none: its
   /// rail has moved on.
   [[gnu::noinline]] void stop_backward(const AxisCore& core, AxisState& state, State& x,
@@ -220,7 +215,7 @@ class DriveTrain final : public Train {
   template <bool kSwitching>
   Cut cut_at_event(AxisCore& core, AxisState& state, const Whole& from, Whole& to, double start_s,
                    double duration_s, const ShaftBranch& branch, double load_nm) noexcept;
-  /// The distances to events. `current_a` are dying_at_start() or dying_now().
+  /// The distances to events. `current_a` are the terminals' currents, or dying_at_start().
   EventValues values_at(const AxisCore& core, TerminalSet dying, const PhaseValues& current_a, const Whole& x,
                         const ShaftBranch& branch, double load_nm, double corner) const noexcept;
   void add_electrical(TerminalSet dying, const PhaseValues& current_a, const RotorMotion& motion,

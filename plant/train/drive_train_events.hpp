@@ -58,22 +58,22 @@ auto DriveTrain<Machine, Shaft>::cut_at_event(AxisCore& core, AxisState& state, 
     if constexpr (kSwitching) add_switching(core, state, x.machine, motion_of(x), terminal_v, found);
     return found;
   };
+  PhaseValues end_a{};
   const auto values = [&](const Whole& x) noexcept {
     if constexpr (kSwitching) {
       piece_.knows_end = piece_.turning_on != 0;
       if (piece_.knows_end) piece_.end_v = floating_within(core, x.machine, motion_of(x));
     }
-    return found_at(x, dying != 0 ? dying_now(core, state, x.machine, motion_of(x)) : PhaseValues{},
-                    piece_.end_v);
+    if (dying != 0) end_a = currents(core, state, x.machine, motion_of(x));
+    return found_at(x, end_a, piece_.end_v);
   };
   PhaseValues begun_v{};
   if constexpr (kSwitching) begun_v = first_v(core, from.machine, motion_of(from));
-  const EventValues before = found_at(from, dying_at_start(), begun_v);
-  piece_.part = 1.0;
-  const Crossing crossing = located_event(before, values(to), [&](double fraction) noexcept {
+  const EventValues after = values(to);
+  const EventValues before = found_at(from, dying_at_start(end_a), begun_v);
+  const Crossing crossing = located_event(before, after, [&](double fraction) noexcept {
     const double shorter_s = fraction * duration_s;
     reconnect_piece(core, state, start_s, shorter_s, from.machine, motion_of(from));
-    piece_.part = fraction;
     to = from;
     step(core, to, shorter_s, branch, load_nm);
     return values(to);

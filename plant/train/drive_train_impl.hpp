@@ -147,7 +147,7 @@ void DriveTrain<Machine, Shaft>::run_piece(AxisCore& core, AxisState& state, Who
     const double stop_s = piece_stop_s(core, state, start_s, end_s);
     const double duration_s = stop_s - start_s;
     connect_piece(core, state, start_s, duration_s, from.machine, from_motion);
-    note_begun(core, state, from.machine, from_motion, duration_s);
+    note_begun(core, state, from.machine, from_motion);
     ShaftBranch branch;
     if (core.shaft_has_events || blocked) {
       branch = branch_of(core.shaft, from.shaft, torque_nm(c_, from.machine, from_motion), load_nm, blocked,
@@ -293,9 +293,7 @@ void DriveTrain<Machine, Shaft>::open(AxisCore& core, AxisState& state, double s
   if (is_first) forget_turn_ons();
   piece_.current_a = currents(core, state, piece_.from, turned(motion));
   connect_piece(core, state, start_s, duration_s, piece_.from, turned(motion));
-  note_begun(core, state, piece_.from, turned(motion), duration_s);
-  piece_.whole_s = duration_s;
-  piece_.part = 1.0;
+  note_begun(core, state, piece_.from, turned(motion));
 }
 
 template <class Machine, class Shaft>
@@ -332,7 +330,6 @@ void DriveTrain<Machine, Shaft>::shorten(AxisCore& core, AxisState& state, doubl
                                          const RotorMotion& motion) noexcept {
   piece_.stage = piece_.from;
   reconnect_piece(core, state, start_s, duration_s, piece_.from, turned(motion));
-  piece_.part = duration_s / piece_.whole_s;
 }
 
 template <class Machine, class Shaft>
@@ -341,8 +338,10 @@ void DriveTrain<Machine, Shaft>::add_events(const AxisCore& core, const AxisStat
   const RotorMotion at = turned(motion);
   const TerminalSet dying = piece_.circuit.dying;
   PhaseValues current_a{};
-  if (dying != 0)
-    current_a = end == PieceEnd::kStart ? dying_at_start() : dying_now(core, state, piece_.stage, at);
+  if (dying != 0) {
+    current_a = currents(core, state, piece_.stage, at);  // where the stages have led
+    if (end == PieceEnd::kStart) current_a = dying_at_start(current_a);
+  }
   add_electrical(dying, current_a, at, piece_.corner, values);
   if (!piece_.has_switching) return;
   const State& x = end == PieceEnd::kStart ? piece_.from : piece_.stage;
@@ -356,6 +355,8 @@ template <class Machine, class Shaft>
 void DriveTrain<Machine, Shaft>::close(AxisCore& core, AxisState& state, double start_s, double duration_s,
                                        const RotorMotion& from, const RotorMotion& to, int event) noexcept {
   const RotorMotion end = turned(to);
+  piece_.knows_end = piece_.turning_on != 0;
+  if (piece_.knows_end) piece_.end_v = floating_within(core, piece_.stage, end);
   if (event >= 0) settle_terminals(core, state, piece_.stage, end, event);
   if (piece_.begun != 0) stop_backward(core, state, piece_.stage, end);
   if (piece_.watched && event >= first_break_event()) pull_break(core, state, start_s + duration_s);

@@ -140,8 +140,8 @@ void DriveTrain<Machine, Shaft>::note_turn_on(int electrical_event) noexcept {
 
 template <class Machine, class Shaft>
 void DriveTrain<Machine, Shaft>::note_begun(const AxisCore& core, const AxisState& state, const State& x,
-                                            const RotorMotion& motion, double duration_s) noexcept {
-  piece_.begun = 0;
+                                            const RotorMotion& motion) noexcept {
+  piece_.begun = piece_.rising = 0;
   if (piece_.circuit.dying == 0 || state.injected.phase_short != 0.0 || state.injected.neutral_short != 0.0)
     return;
   ThreePhase start_a = phases_of(piece_.current_a);
@@ -152,28 +152,27 @@ void DriveTrain<Machine, Shaft>::note_begun(const AxisCore& core, const AxisStat
   if (piece_.begun == 0) return;
   const TerminalInput u =
       piece_.switch_ohm == 0.0 ? piece_.circuit.start : input_behind_switches(core.connection, x, motion);
-  const State ahead = advanced(x, duration_s, derivative(c_, x, motion, u));
-  piece_.rise_a = currents(core, state, ahead, motion);
-  const auto forward = [](double i_a, double clamp_v) noexcept { return i_a * clamp_v < 0.0 ? i_a : 0.0; };
-  piece_.rise_a = by_terminal(forward, piece_.rise_a, piece_.circuit.start_v);
+  const auto currents_at = [&](const State& at) noexcept {
+    return phases_of(currents(core, state, at, motion));
+  };
+  ThreePhase before_a = currents_at(x);
+  ThreePhase after_a = currents_at(advanced(x, core.step_s, derivative(c_, x, motion, u)));
+  ThreePhase clamp_v = phases_of(piece_.circuit.start_v);
+  for (int k = 0; k < 3; ++k) {
+    const double rise_a = phase(after_a, k) - phase(before_a, k);
+    if ((piece_.begun & terminal_bit(k)) != 0 && rise_a * phase(clamp_v, k) < 0.0)
+      piece_.rising |= terminal_bit(k);
+  }
 }
 
 template <class Machine, class Shaft>
-PhaseValues DriveTrain<Machine, Shaft>::dying_at_start() const noexcept {
+PhaseValues DriveTrain<Machine, Shaft>::dying_at_start(const PhaseValues& end_a) const noexcept {
   PhaseValues i = piece_.current_a;
-  if ((piece_.begun & 1u) != 0) i.a = piece_.rise_a.a;
-  if ((piece_.begun & 2u) != 0) i.b = piece_.rise_a.b;
-  if ((piece_.begun & 4u) != 0) i.c = piece_.rise_a.c;
-  return i;
-}
-
-template <class Machine, class Shaft>
-PhaseValues DriveTrain<Machine, Shaft>::dying_now(const AxisCore& core, const AxisState& state,
-                                                  const State& x, const RotorMotion& motion) const noexcept {
-  PhaseValues i = currents(core, state, x, motion);
-  if ((piece_.begun & 1u) != 0) i.a /= piece_.part;
-  if ((piece_.begun & 2u) != 0) i.b /= piece_.part;
-  if ((piece_.begun & 4u) != 0) i.c /= piece_.part;
+  const PhaseValues& clamp_v = piece_.circuit.start_v;
+  const auto mirrored = [](double end, double clamp) noexcept { return end * clamp > 0.0 ? -end : 0.0; };
+  if ((piece_.rising & 1u) != 0) i.a = mirrored(end_a.a, clamp_v.a);
+  if ((piece_.rising & 2u) != 0) i.b = mirrored(end_a.b, clamp_v.b);
+  if ((piece_.rising & 4u) != 0) i.c = mirrored(end_a.c, clamp_v.c);
   return i;
 }
 

@@ -29,19 +29,28 @@ Crossing first_crossing(const EventValues& from, const EventValues& to) noexcept
 /// piece after which it comes. `values_after(fraction)` takes the step anew over this part of the piece; the
 /// last call is the one with the result.
 template <class ValuesAfter>
-Crossing located_event(const EventValues& before, const EventValues& after,
-                       ValuesAfter values_after) noexcept {
-  constexpr int kMaxGuesses = 6;
+Crossing located_event(const EventValues& before, EventValues after, ValuesAfter values_after) noexcept {
+  constexpr int kMaxGuesses = 10;
+  constexpr int kMaxEarlier = 3;
+  constexpr double kTogether = 1.0 - 1e-9;  // the last two currents of a star die at once
   Crossing crossing = first_crossing(before, after);
-  if (crossing.event < 0) return crossing;
-  const auto which = static_cast<std::size_t>(crossing.event);
-  Bracket bracket{.low_value = before.value[which], .high_value = after.value[which]};
-  const double close_enough = 1e-13 * (std::abs(bracket.low_value) + std::abs(bracket.high_value));
-  for (int guess = 0; guess < kMaxGuesses; ++guess) {
-    crossing.fraction = bracket.guess();
-    const double value = values_after(crossing.fraction).value[which];
-    if (std::abs(value) <= close_enough) break;
-    bracket.narrow(crossing.fraction, value);
+  double end = 1.0;
+  for (int earlier = 0; crossing.event >= 0; ++earlier) {
+    const auto which = static_cast<std::size_t>(crossing.event);
+    Bracket bracket{.low_value = before.value[which], .high = end, .high_value = after.value[which]};
+    const double close_enough = 1e-13 * (std::abs(bracket.low_value) + std::abs(bracket.high_value));
+    for (int guess = 0; guess < kMaxGuesses; ++guess) {
+      crossing.fraction = bracket.guess();
+      after = values_after(crossing.fraction);
+      if (std::abs(after.value[which]) <= close_enough) break;
+      bracket.narrow(crossing.fraction, after.value[which]);
+    }
+    // Another one may have come before: its value goes less linearly.
+    after.value[which] = 0.0;
+    const Crossing first = first_crossing(before, after);
+    if (first.fraction >= kTogether || earlier == kMaxEarlier) break;
+    end = crossing.fraction;
+    crossing.event = first.event;
   }
   return crossing;
 }

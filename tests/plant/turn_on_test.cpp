@@ -108,47 +108,55 @@ TEST(TurnOn, AFloatingTerminalBeginsToConductBelowTheRailByItsDiode) {
   }
 }
 
-/// When the current of terminal a is zero again that begins at time 0 while b and c are at the lower rail:
-/// the ways of all three are then R, L and emf, and the forward voltage shifts the neutral by a third.
-double pulse_s(const Emf& emf, double diode_v, double longest_s) {
-  const auto current_a = [&](double time_s) {
-    constexpr int kSteps = 400;  // Simpson
+/// When a current is zero again that begins at from_s behind R and L, by Simpson's rule; it is not before a
+/// quarter of longest_s has passed.
+template <class Voltage>
+double dies_s(double from_s, double longest_s, const Voltage& voltage_v) {
+  const auto volt_seconds = [&](double to_s) {
+    constexpr int kSteps = 400;
     double sum = 0.0;
     for (int n = 0; n <= kSteps; ++n) {
-      const double at_s = time_s * n / kSteps;
+      const double at_s = from_s + (to_s - from_s) * n / kSteps;
       const double weight = n == 0 || n == kSteps ? 1.0 : n % 2 == 1 ? 4.0 : 2.0;
-      sum += weight * std::exp((at_s - time_s) / kTime_s) * (-2.0 / 3.0 * diode_v - emf.at(at_s)[0]);
+      sum += weight * std::exp((at_s - to_s) / kTime_s) * voltage_v(at_s);
     }
-    return sum * time_s / (3.0 * kSteps * kInductance_h);
+    return sum * (to_s - from_s);
   };
-  return first_instant(0.25 * longest_s, 0.5 * longest_s,
-                       [&](double time_s) { return current_a(time_s) < 0.0; });
+  return first_instant(from_s + 0.25 * longest_s, from_s + 0.5 * longest_s,
+                       [&](double time_s) { return volt_seconds(time_s) < 0.0; });
 }
 
-// The legs of b and c close 5 us before the emf leaves the lower rail: the diode of a conducts for about 10
-// us, less than a step. Catches: a current that is looked for only where it does not begin at zero, and then
-// goes on against its diode or is clamped to the other rail.
+// Two legs close at the lower rail 5 us before the emf of the third leaves it: its diode conducts for about
+// 10 us, less than a step, behind R, L, the emf and a third of its forward voltage less. Catches: a current
+// that is looked for only where it does not begin at zero, and then goes on against its diode or is clamped
+// to the other rail; the residue of rounding at its start taken for its end.
 TEST(TurnOn, APulseWithinAStepEndsAtItsInstant) {
   constexpr double kSpeed_rad_s = 300.0;
   constexpr double kAhead_s = 5e-6;
-  for (const double diode_v : kForward_v) {
-    AxisParameters p = turning_motor(kSpeed_rad_s);
-    p.drive.inverter.diode_v = diode_v;
-    const Emf from_zero{constants_of(pm(p)), kSpeed_rad_s};
-    const auto is_beyond = [&](double time_s) { return 1.5 * from_zero.at(time_s)[0] < -diode_v; };
-    const double beyond_s = first_instant(0.0, 1e-6, is_beyond);
-    const double leaves_s =
-        first_instant(beyond_s + 1e-6, beyond_s + 2e-6, [&](double time_s) { return !is_beyond(time_s); });
-    const double start_rad = kSpeed_rad_s * (leaves_s - kAhead_s);
-    const double expected_s = pulse_s({constants_of(pm(p)), kSpeed_rad_s, start_rad}, diode_v, 20e-6);
+  for (std::size_t k = 0; k < 3; ++k) {
+    for (const double diode_v : kForward_v) {
+      AxisParameters p = turning_motor(kSpeed_rad_s);
+      p.drive.inverter.diode_v = diode_v;
+      const Emf from_zero{constants_of(pm(p)), kSpeed_rad_s};
+      const auto is_beyond = [&](double time_s) { return 1.5 * from_zero.at(time_s)[k] < -diode_v; };
+      const double beyond_s = first_instant(0.0, 1e-6, is_beyond);
+      const double leaves_s =
+          first_instant(beyond_s + 1e-6, beyond_s + 2e-6, [&](double time_s) { return !is_beyond(time_s); });
+      const double start_rad = kSpeed_rad_s * (leaves_s - kAhead_s);
+      const Emf emf{constants_of(pm(p)), kSpeed_rad_s, start_rad};
+      const double expected_s =
+          dies_s(0.0, 20e-6, [&](double time_s) { return -2.0 / 3.0 * diode_v - emf.at(time_s)[k]; });
 
-    Axis axis(p, {.period_s = kTick_s, .substeps = 2}, 1, 0);
-    spin(axis, kSpeed_rad_s, start_rad);
-    axis.advance(legs({}, kStaysLow, kStaysLow), 0);
-    ASSERT_EQ(events(axis).size(), 1u) << diode_v;
-    EXPECT_NEAR(events(axis)[0], expected_s, 1e-11) << diode_v;
-    EXPECT_GT(expected_s, 1.9 * kAhead_s);
-    EXPECT_EQ(currents(axis)[0], 0.0) << diode_v;
+      Axis axis(p, {.period_s = kTick_s, .substeps = 2}, 1, 0);
+      spin(axis, kSpeed_rad_s, start_rad);
+      PhaseCommand command = legs(kStaysLow, kStaysLow, kStaysLow);
+      command.edges[k] = {};
+      axis.advance(command, 0);
+      ASSERT_EQ(events(axis).size(), 1u) << k << " " << diode_v;
+      EXPECT_NEAR(events(axis)[0], expected_s, 1e-11) << k << " " << diode_v;
+      EXPECT_GT(expected_s, 1.9 * kAhead_s);
+      EXPECT_EQ(currents(axis)[k], 0.0) << k << " " << diode_v;
+    }
   }
 }
 
