@@ -102,7 +102,11 @@ Axis::Axis(const AxisParameters& p, AxisTiming timing, std::uint64_t seed, std::
 }
 
 Axis::Axis(const Axis& other)
-    : core_(other.core_), train_(other.train_->clone()), state_(other.state_), truth_(other.truth_) {}
+    : core_(other.core_),
+      train_(other.train_->clone()),
+      state_(other.state_),
+      truth_(other.truth_),
+      open_tick_(other.open_tick_) {}
 
 Axis& Axis::operator=(const Axis& other) {
   if (this != &other) {
@@ -110,6 +114,7 @@ Axis& Axis::operator=(const Axis& other) {
     train_ = other.train_->clone();
     state_ = other.state_;
     truth_ = other.truth_;
+    open_tick_ = other.open_tick_;
   }
   return *this;
 }

@@ -51,6 +51,9 @@ class Axis {
   // command is in force: open_tick(), run_part() from its start to its end, close_tick().
 
   void open_tick(Tick tick) noexcept;
+  /// Copies a state of this axis over another one of it, but for what stands still at gate level, four fifths
+  /// of it: the commands of a drive and what the sensors of a sample hold.
+  static void copy_but_standing(const AxisState& from, AxisState& to) noexcept;
   /// From start_s to end_s within the tick, at most a step. The currents of the terminals at its end; none
   /// if the state is not finite: the axis then stands where it was and has the fault `diverged`.
   std::optional<PhaseValues> run_part(const LegLevels& levels, double start_s, double end_s) noexcept;
@@ -120,6 +123,8 @@ class Axis {
   /// The currents that the sensors convert.
   PhaseValues sensed_currents() const noexcept;
   void hold(const MotionState& before) noexcept;
+  /// go_back() where the drive does not have this tick, or had it with other faults.
+  void reopen(const AxisState& state, Tick tick) noexcept;
   double load_at(Tick tick) const noexcept;
   void adjust() noexcept;
   /// Works out what the machine shows in this state.
@@ -129,7 +134,8 @@ class Axis {
   AxisCore core_;
   std::unique_ptr<Train> train_;
   AxisState state_;
-  MachineTruth truth_;  ///< follows from the state
+  MachineTruth truth_;   ///< follows from the state
+  Tick open_tick_ = -1;  ///< the last one of open_tick()
 };
 
 /// The number of integration steps for a tick of this length, at most kMaxSubsteps. A step is at most a tenth

@@ -1,12 +1,32 @@
 // A tick in parts, for GateAxis.
+#include <cstddef>
+#include <cstring>
+#include <span>
+#include <type_traits>
+
 #include "plant/axis.hpp"
 #include "plant/drive/phases.hpp"
 
 namespace drivebench {
 
+void Axis::copy_but_standing(const AxisState& from, AxisState& to) noexcept {
+  static_assert(std::is_trivially_copyable_v<AxisState>);
+  const auto* const begin = reinterpret_cast<const std::byte*>(&from);
+  const auto copy = [&](const std::byte* first, const std::byte* last) noexcept {
+    std::memcpy(reinterpret_cast<std::byte*>(&to) + (first - begin), first,
+                static_cast<std::size_t>(last - first));
+  };
+  const auto commands = std::as_bytes(std::span(&from.drive.commands, 1));
+  const auto sensors = std::as_bytes(std::span(&from.sensors, 1));
+  copy(begin, commands.data());
+  copy(commands.data() + commands.size(), sensors.data());
+  copy(sensors.data() + sensors.size(), begin + sizeof(AxisState));
+}
+
 void Axis::open_tick(Tick tick) noexcept {
   begin_tick({}, tick);
   core_.follows = true;  // every piece reports
+  open_tick_ = tick;
 }
 
 std::optional<PhaseValues> Axis::run_part(const LegLevels& levels, double start_s, double end_s) noexcept {
@@ -30,6 +50,14 @@ void Axis::close_tick() noexcept {
 }
 
 void Axis::go_back(const AxisState& state, Tick tick) noexcept {
+  const bool stays_open = open_tick_ == tick && !core_.p.thermal.enabled && !core_.bootstrap.used() &&
+                          std::memcmp(&state.injected, &state_.injected, sizeof(InjectedFaults)) == 0;
+  if (!stays_open) return reopen(state, tick);
+  copy_but_standing(state, state_);
+  core_.breaks = state_.break_input.pending != 0 || watches_break(core_, state_);
+}
+
+void Axis::reopen(const AxisState& state, Tick tick) noexcept {
   state_ = state;
   open_tick(tick);
   state_ = state;
@@ -38,7 +66,7 @@ void Axis::go_back(const AxisState& state, Tick tick) noexcept {
 
 void Axis::take_changes(Tick tick) noexcept {
   const AxisState state = state_;
-  go_back(state, tick);
+  reopen(state, tick);
   core_.drive.take_stiff_link(state_.drive);
 }
 

@@ -3,8 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
-#include <cstring>
-#include <type_traits>
 #include <variant>
 
 namespace drivebench {
@@ -13,22 +11,6 @@ namespace {
 AxisParameters with_terminals(AxisParameters p) {
   p.sensors.terminals = true;
   return p;
-}
-
-/// The state but for what stands still at gate level, four fifths of it: the commands of a drive and what the
-/// sensors of a sample hold.
-void copy_but_standing(const AxisState& from, AxisState& to) noexcept {
-  static_assert(std::is_trivially_copyable_v<AxisState>);
-  const auto* const begin = reinterpret_cast<const std::byte*>(&from);
-  const auto copy = [&](const std::byte* first, const std::byte* last) noexcept {
-    std::memcpy(reinterpret_cast<std::byte*>(&to) + (first - begin), first,
-                static_cast<std::size_t>(last - first));
-  };
-  const auto commands = std::as_bytes(std::span(&from.drive.commands, 1));
-  const auto sensors = std::as_bytes(std::span(&from.sensors, 1));
-  copy(begin, commands.data());
-  copy(commands.data() + commands.size(), sensors.data());
-  copy(sensors.data() + sensors.size(), begin + sizeof(AxisState));
 }
 
 /// next_edge() and what base_ is behind now by [parts].
@@ -68,11 +50,11 @@ GateAxis::GateAxis(const AxisParameters& p, std::int64_t period_ns, int substeps
 void GateAxis::keep(Moment& moment) const {
   moment.clock = clock_;
   moment.sums = tap_.sums;
-  copy_but_standing(axis_.state(), moment.axis);
+  Axis::copy_but_standing(axis_.state(), moment.axis);
 }
 
 void GateAxis::begin_with(const AxisState& state) {
-  base_.axis = here_.axis = unjoined_.axis = state;
+  base_.axis = here_.axis = unjoined_.axis = aside_.axis = state;
   here_.clock.at = kNowhere;
 }
 
@@ -199,8 +181,7 @@ void GateAxis::stop_here() {
 
 void GateAxis::catch_up() {
   if (passed_ < told_count_) return;
-  Moment ahead = base_;
-  keep(ahead);
+  keep(aside_);
   const Picoseconds begun = base_.clock.at;
   const std::size_t known = log_.size();
   std::size_t over = told_count_;
@@ -215,7 +196,7 @@ void GateAxis::catch_up() {
     ++parts;
     keep(base_);
   }
-  go_back(ahead);
+  go_back(aside_);
   if (parts == 0) return;
   log_.erase(log_.begin(), log_.begin() + static_cast<std::ptrdiff_t>(over));
   passed_ -= over;
@@ -301,11 +282,10 @@ std::optional<GateEdge> GateAxis::next_edge(Picoseconds limit) {
 
 GateAxis::Now GateAxis::look() {
   if (clock_.at == now_) return seen();
-  Moment ahead = base_;
-  keep(ahead);
+  keep(aside_);
   run_to_now();
   const Now now = seen();
-  go_back(ahead);
+  go_back(aside_);
   return now;
 }
 

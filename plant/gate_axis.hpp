@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <cstdint>
@@ -56,13 +57,12 @@ class GateAxis {
   /// fills `edges`; an empty one asks for none. The number of events written. An event that a change at
   /// `until` itself brings, such as a jump beyond a threshold, belongs to the next run.
   std::size_t run(Picoseconds until, std::span<GateEdge> edges);
-  /// The same if nothing is due up to there; else it does nothing and is false.
-  bool run_idle(Picoseconds until) noexcept {
-    const bool due = clock_.at < until || catch_up_at_ <= until ||
-                     (passed_ < log_.size() && log_[passed_].edge.at <= until);
-    if (!due) now_ = until;
-    return !due;
+  /// Nothing is due before this instant: skip_to() does up to there what run() would do.
+  Picoseconds idle_before() const noexcept {
+    const Picoseconds event_at = passed_ < log_.size() ? log_[passed_].edge.at : LegTimer::kNever;
+    return diverged() ? now_ : std::min({clock_.at + 1, catch_up_at_, event_at, after(clock_.diverged_from)});
   }
+  void skip_to(Picoseconds until) noexcept { now_ = until; }
   /// The first event up to `limit` if no leg is set before; changes nothing. Asked again it goes on from
   /// where it has looked to.
   std::optional<GateEdge> next_edge(Picoseconds limit);
@@ -182,6 +182,8 @@ class GateAxis {
   double within_tick_s(Picoseconds at) const noexcept;
   Picoseconds at_of(double within_tick_s, Picoseconds from) const noexcept;
 
+  static Picoseconds after(Picoseconds at) noexcept { return at == LegTimer::kNever ? at : at + 1; }
+
   static constexpr Picoseconds kNowhere = -1;
 
   Axis axis_;
@@ -196,6 +198,7 @@ class GateAxis {
   Moment base_{};      ///< where that part, or the first one that next_edge() has looked at, began
   Moment unjoined_{};  ///< before a part with joined legs that does not begin at base_
   Moment here_{};      ///< at now_, if run_to_now() has been there since begin_here(); else at kNowhere
+  Moment aside_{};     ///< where it was before look() or catch_up() took it back
   Picoseconds now_ = 0;
   std::vector<Logged> log_{};                   ///< what happens from base_ on
   std::size_t passed_ = 0;                      ///< of them, which have been handed out

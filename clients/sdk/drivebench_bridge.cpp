@@ -42,6 +42,16 @@ int null_argument(Bridge& bridge, const char* name) noexcept {
   return bridge.fail(DRIVEBENCH_BAD_ARGUMENT, std::string(name) + " is a null pointer");
 }
 
+/// drivebench_bridge_run() where something is due.
+[[gnu::noinline]] int run_on(Bridge& bridge, std::uint64_t until_ps, std::span<drivebench_bridge_edge> edges,
+                             std::size_t* count, std::uint64_t* now_ps) noexcept {
+  std::size_t written = 0;
+  const int code = bridge.run(until_ps, edges, written);
+  if (count != nullptr) *count = written;
+  if (now_ps != nullptr) *now_ps = bridge.now_ps();
+  return code;
+}
+
 /// Whether a struct of the program's header is one that this library fills from its start.
 constexpr bool fills(std::size_t of_program, std::size_t of_library) noexcept {
   return of_program <= of_library && of_program % 8 == 0;
@@ -98,11 +108,10 @@ int drivebench_bridge_run(drivebench_bridge* bridge, uint64_t until_ps, driveben
   if (b == nullptr) return DRIVEBENCH_BAD_ARGUMENT;
   if (room != 0 && edges == nullptr) return null_argument(*b, "edges");
   if (room != 0 && count == nullptr) return null_argument(*b, "count");
-  std::size_t written = 0;
-  const int code = b->run(until_ps, {edges, room}, written);
-  if (count != nullptr) *count = written;
-  if (now_ps != nullptr) *now_ps = b->now_ps();
-  return code;
+  if (!b->run_idle(until_ps)) return run_on(*b, until_ps, {edges, room}, count, now_ps);
+  if (count != nullptr) *count = 0;
+  if (now_ps != nullptr) *now_ps = until_ps;
+  return DRIVEBENCH_OK;
 }
 
 int drivebench_bridge_next_edge(drivebench_bridge* bridge, uint64_t limit_ps, drivebench_bridge_edge* edge,

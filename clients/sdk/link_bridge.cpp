@@ -32,7 +32,7 @@ int LinkBridge::ask(const shm::BridgeArguments& call, Take take) noexcept {
     std::string sentence;
     memory_->call([&](const shm::BridgeReply& reply) {
       code = static_cast<int>(reply.code);
-      now_ps_ = reply.now_ps;
+      set_time(reply.now_ps, 0);
       // A run in which the machine diverges has edges as well.
       if (code == DRIVEBENCH_OK || code == DRIVEBENCH_LATCHED) take(reply);
       if (code != DRIVEBENCH_OK) sentence = shm::text_in(reply.sentence);

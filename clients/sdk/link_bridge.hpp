@@ -18,7 +18,6 @@ class LinkBridge final : public abi::Bridge {
   int set(std::uint32_t leg, const drivebench_leg& setting) noexcept override;
   int run(std::uint64_t until_ps, std::span<drivebench_bridge_edge> edges,
           std::size_t& count) noexcept override;
-  std::uint64_t now_ps() const noexcept override { return now_ps_; }
   int next_edge(std::uint64_t limit_ps, drivebench_bridge_edge& edge, bool& found) noexcept override;
   int read(drivebench_bridge_state& state) noexcept override;
   int mark() noexcept override;
@@ -40,7 +39,6 @@ class LinkBridge final : public abi::Bridge {
 
   link::Link link_;
   std::unique_ptr<link::BridgeMemory> memory_;
-  std::uint64_t now_ps_ = 0;
 };
 
 }  // namespace drivebench::sdk

@@ -126,7 +126,9 @@ InprocBridge::InprocBridge(const BenchConfig& config, std::uint32_t axis)
       seed_(config.setup.seed),
       index_(axis),
       configuration_(configuration_hash(config) + axis),
-      axis_(new_axis()) {}
+      axis_(new_axis()) {
+  keep_time();
+}
 
 std::unique_ptr<GateAxis> InprocBridge::new_axis() const {
   return std::make_unique<GateAxis>(parameters_, period_ns_, substeps_, seed_, index_);
@@ -155,12 +157,13 @@ int InprocBridge::set(std::uint32_t leg, const drivebench_leg& s) noexcept {
   std::string problem = problem_in_leg(s);
   if (!problem.empty()) return fail(DRIVEBENCH_OUT_OF_RANGE, "leg " + std::to_string(leg) + ": " + problem);
   const bool pwm = s.mode >= DRIVEBENCH_LEG_PWM;
-  axis_->set_leg(leg, {.mode = static_cast<LegMode>(s.mode),
+  axis().set_leg(leg, {.mode = static_cast<LegMode>(s.mode),
                        .centred = pwm ? s.centred : 0,
                        .period_start = pwm ? static_cast<Picoseconds>(s.period_start_ps) : 0,
                        .period = pwm ? static_cast<Picoseconds>(s.period_ps) : 0,
                        .compare = pwm ? static_cast<Picoseconds>(s.compare_ps) : 0,
                        .dead = static_cast<Picoseconds>(s.dead_ps)});
+  keep_time();
   return DRIVEBENCH_OK;
 }
 
@@ -169,21 +172,21 @@ int InprocBridge::run(std::uint64_t until_ps, std::span<drivebench_bridge_edge> 
   count = 0;
   if (const int code = check_time("until_ps", until_ps); code != DRIVEBENCH_OK) return code;
   const auto until = static_cast<Picoseconds>(until_ps);
-  if (axis_->run_idle(until)) return check_finite();
   if (edges.empty()) {
-    axis_->run(until, {});
+    axis().run(until, {});
   } else {
-    run_with(edges, until, count);
+    run_with(axis(), edges, until, count);
   }
+  keep_time();
   return check_finite();
 }
 
-void InprocBridge::run_with(std::span<drivebench_bridge_edge> edges, Picoseconds until,
+void InprocBridge::run_with(GateAxis& axis, std::span<drivebench_bridge_edge> edges, Picoseconds until,
                             std::size_t& count) noexcept {
   std::array<GateEdge, 16> some;
   while (count < edges.size()) {
     const std::span<GateEdge> room = std::span(some).first(std::min(some.size(), edges.size() - count));
-    const std::size_t written = axis_->run(until, room);
+    const std::size_t written = axis.run(until, room);
     for (std::size_t n = 0; n < written; ++n)
       edges[count++] = edge_of(room[n]);
     if (written < room.size()) break;
@@ -193,14 +196,15 @@ void InprocBridge::run_with(std::span<drivebench_bridge_edge> edges, Picoseconds
 int InprocBridge::next_edge(std::uint64_t limit_ps, drivebench_bridge_edge& edge, bool& found) noexcept {
   found = false;
   if (const int code = check_time("limit_ps", limit_ps); code != DRIVEBENCH_OK) return code;
-  const std::optional<GateEdge> next = axis_->next_edge(static_cast<Picoseconds>(limit_ps));
+  const std::optional<GateEdge> next = axis().next_edge(static_cast<Picoseconds>(limit_ps));
+  keep_time();
   found = next.has_value();
   if (found) edge = edge_of(*next);
   return DRIVEBENCH_OK;
 }
 
 int InprocBridge::read(drivebench_bridge_state& s) noexcept {
-  const GateAxis::Now now = axis_->look();
+  const GateAxis::Now now = axis().look();
   s = {.now_ps = now_ps(),
        .current_a = {},
        .terminal_v = {},
@@ -229,7 +233,7 @@ int InprocBridge::read(drivebench_bridge_state& s) noexcept {
 }
 
 InprocBridge::Mark InprocBridge::mark_of_now() noexcept {
-  const GateAxis::Now now = axis_->look();
+  const GateAxis::Now now = axis().look();
   return {.at = axis_->now(), .angle_rad = turned_rad(now.state), .sums = now.sums};
 }
 
@@ -267,7 +271,8 @@ int InprocBridge::set_load(double load_nm) noexcept {
   if (const auto* refused = std::get_if<RefusedRequest>(&judged)) {
     return fail(static_cast<int>(refused->code), refused->sentence);
   }
-  axis_->set_load(load_nm);
+  axis().set_load(load_nm);
+  keep_time();
   return DRIVEBENCH_OK;
 }
 
@@ -290,7 +295,8 @@ int InprocBridge::set_parameter(const char* name, double value) noexcept {
   }
   AxisParameters changed = axis_->parameters();
   find_parameter(changed, name)->set(changed, value);
-  axis_->set_parameters(changed);
+  axis().set_parameters(changed);
+  keep_time();
   return DRIVEBENCH_OK;
 }
 
@@ -321,24 +327,27 @@ int InprocBridge::inject(const char* name, double value) noexcept {
   if (const auto* refused = std::get_if<RefusedRequest>(&judged)) {
     return fail(static_cast<int>(refused->code), refused->sentence);
   }
-  axis_->inject(find_injectable_fault(name), value);
+  axis().inject(find_injectable_fault(name), value);
+  keep_time();
   return DRIVEBENCH_OK;
 }
 
 int InprocBridge::clear() noexcept {
-  axis_->clear_faults();
+  axis().clear_faults();
+  keep_time();
   return DRIVEBENCH_OK;
 }
 
 int InprocBridge::save(std::vector<std::byte>& state) noexcept {
   const std::vector<double> values = live_values();
   const auto parameters = std::as_bytes(std::span(values));
-  const std::vector<std::byte> axis = axis_->save();
+  const std::vector<std::byte> axis_bytes = axis().save();
+  keep_time();
   Header header{.magic = kMagic, .configuration = configuration_, .digest = 0, .mark = mark_};
   const auto head = std::as_bytes(std::span(&header, 1));
   state.resize(head.size());
   state.insert(state.end(), parameters.begin(), parameters.end());
-  state.insert(state.end(), axis.begin(), axis.end());
+  state.insert(state.end(), axis_bytes.begin(), axis_bytes.end());
   header.digest = digest_of(mark_, std::span(state).subspan(head.size()));
   std::ranges::copy(head, state.begin());
   return DRIVEBENCH_OK;
@@ -366,6 +375,7 @@ int InprocBridge::restore(std::span<const std::byte> state) noexcept {
   if (!restored->restore(rest.subspan(parameters.size()), is_possible_within_tick))
     return refuse("holds what no bridge can come to");
   axis_ = std::move(restored);
+  keep_time();
   mark_ = header.mark;
   return DRIVEBENCH_OK;
 }

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <memory>
@@ -33,7 +34,6 @@ class InprocBridge final : public abi::Bridge {
   int set(std::uint32_t leg, const drivebench_leg& setting) noexcept override;
   int run(std::uint64_t until_ps, std::span<drivebench_bridge_edge> edges,
           std::size_t& count) noexcept override;
-  std::uint64_t now_ps() const noexcept override { return static_cast<std::uint64_t>(axis_->now()); }
   int next_edge(std::uint64_t limit_ps, drivebench_bridge_edge& edge, bool& found) noexcept override;
   int read(drivebench_bridge_state& state) noexcept override;
   int mark() noexcept override;
@@ -69,9 +69,19 @@ class InprocBridge final : public abi::Bridge {
   int refuse_time(const char* name, std::uint64_t at_ps) noexcept;
   int check_finite() noexcept { return axis_->diverged() ? refuse_diverged() : DRIVEBENCH_OK; }
   int refuse_diverged() noexcept;
+  /// The axis, which run_idle() leaves behind, at the present time.
+  GateAxis& axis() noexcept {
+    axis_->skip_to(static_cast<Picoseconds>(now_ps()));
+    return *axis_;
+  }
+  /// After each call that changes it.
+  void keep_time() noexcept {
+    set_time(static_cast<std::uint64_t>(axis_->now()),
+             std::min(static_cast<std::uint64_t>(axis_->idle_before()), kLastBridgePs + 1));
+  }
   /// Runs to `until` or until the room for edges is full; `count` of them are written.
-  [[gnu::noinline]] void run_with(std::span<drivebench_bridge_edge> edges, Picoseconds until,
-                                  std::size_t& count) noexcept;
+  static void run_with(GateAxis& axis, std::span<drivebench_bridge_edge> edges, Picoseconds until,
+                       std::size_t& count) noexcept;
   Mark mark_of_now() noexcept;
   /// The axis at tick 0, all legs open.
   std::unique_ptr<GateAxis> new_axis() const;
