@@ -103,12 +103,17 @@ bool keeps_promise(const DemoReport& report) {
          report.lockstep.control.peak_error_counts.value_or(HUGE_VAL) <= kPromisedErrorCounts;
 }
 
-/// This program as it can be typed here.
+/// The program with all verbs: beside drivebench-demo, which has two of them.
+fs::path whole_program() {
+  return own_executable().parent_path() / "drivebench";
+}
+
+/// The same as it can be typed here.
 std::string program() {
-  const std::string self = own_executable().string();
+  const std::string whole = whole_program().string();
   std::error_code ignored;
-  const fs::path relative = fs::relative(self, ignored);
-  return relative.empty() ? self : relative.string();
+  const fs::path relative = fs::relative(whole, ignored);
+  return relative.empty() ? whole : relative.string();
 }
 
 void print_comparison(const DemoReport& r) {
@@ -170,6 +175,8 @@ void print_comparison(const DemoReport& r) {
 void print_next_steps(const DemoReport& r) {
   const std::string self = program();
   fmt::print("\nwhat to try next:\n");
+  if (!fs::exists(whole_program()))
+    fmt::print("  ./bench tools    builds the program with all verbs, and the library\n");
   fmt::print("  {} export {} --out move.csv\n", self, r.lockstep.recording);
   fmt::print("  {} serve            and in another terminal\n", self);
   fmt::print("  {} control --load 0.1@0.0365 --set machine.rotor_resistance_ohm=5.85\n", self);

@@ -3,6 +3,7 @@
 import json
 import os
 import pathlib
+import re
 import signal
 import struct
 import subprocess
@@ -366,6 +367,15 @@ class Demo(CommandTest):
         self.assertEqual((found["replay"]["equal"], found["replay"]["state_hash"]), (True, lockstep["state_hash"]))
         for mode in ("lockstep", "realtime"):
             self.drivebench("replay", found[mode]["recording"])
+
+    def test_the_small_program_of_bench_demo_does_the_same(self):
+        """Catches: a verb that drivebench-demo does not have, another run, next commands with a program that has none of
+        them."""
+        done = self.run_program(DRIVEBENCH.with_name("drivebench-demo"), "demo")
+        self.assertIn(done.returncode, (OK, FAILED), done.stderr)
+        hashes = [re.search(r"state hash +(\w+)", said)[1] for said in (done.stdout, self.demo().stdout)]
+        self.assertEqual(hashes[0], hashes[1])
+        self.assertRegex(done.stdout, r"\n  \S*/drivebench new motor --help")
 
     def test_text_has_the_table_and_the_next_commands(self):
         """Catches: a demo that ends without naming its recordings."""

@@ -144,8 +144,8 @@ class Readmes(unittest.TestCase):
                 self.assertIn("inproc:", done.stderr)
         self.assertEqual(said[0], said[1], "in process and over TCP")
         self.assertRegex(said[2], r"(?m)^pass +my-case +1 s +3 checks$")
-        demo = (REPOSITORY / "bench").read_text(encoding="utf-8").split("  demo)\n")[1].split(";;")[0]
-        self.assertIn("drivebench_shared drivebench_inproc", demo, "the README says that ./bench demo builds what this needs")
+        tools = (REPOSITORY / "bench").read_text(encoding="utf-8").split("  tools)")[1].split(";;")[0]
+        self.assertIn("drivebench_shared drivebench_inproc", tools, "the README says that ./bench tools builds what this needs")
         self.assertIn(re.search(r"prints `(300.0 rad/s of 300.0)`", section)[1], said[0])
 
     def test_every_option_of_a_command_is_documented(self):

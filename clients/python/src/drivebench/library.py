@@ -268,7 +268,7 @@ def load() -> Library:
     try:
         return Library(chosen or next(_places()))
     except LibraryNotFound as error:
-        raise LibraryNotFound(f"{error}; DRIVEBENCH_LIBRARY names the file, or install drivebench, or build it with ./bench demo") from error
+        raise LibraryNotFound(f"{error}; DRIVEBENCH_LIBRARY names the file, or install drivebench, or build it with ./bench tools") from error
 
 
 def version() -> str:
