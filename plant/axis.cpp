@@ -133,6 +133,7 @@ void Axis::set_parameters(const AxisParameters& p) noexcept {
 
 void Axis::restore(const AxisState& state) noexcept {
   state_ = state;
+  open_tick_ = -1;
   core_.injected_bits = injected_bits(state.injected);
   core_.segment_count = 0;
   adjust();

@@ -135,7 +135,7 @@ class Axis {
   std::unique_ptr<Train> train_;
   AxisState state_;
   MachineTruth truth_;   ///< follows from the state
-  Tick open_tick_ = -1;  ///< the last one of open_tick()
+  Tick open_tick_ = -1;  ///< the last one of open_tick(), since restore()
 };
 
 /// The number of integration steps for a tick of this length, at most kMaxSubsteps. A step is at most a tenth

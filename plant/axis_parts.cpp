@@ -1,4 +1,5 @@
 // A tick in parts, for GateAxis.
+#include <algorithm>
 #include <cstddef>
 #include <cstring>
 #include <span>
@@ -50,8 +51,11 @@ void Axis::close_tick() noexcept {
 }
 
 void Axis::go_back(const AxisState& state, Tick tick) noexcept {
+  const auto is_same = [&](const InjectableFault& row) {
+    return state.injected.*row.member == state_.injected.*row.member;
+  };
   const bool stays_open = open_tick_ == tick && !core_.p.thermal.enabled && !core_.bootstrap.used() &&
-                          std::memcmp(&state.injected, &state_.injected, sizeof(InjectedFaults)) == 0;
+                          std::ranges::all_of(kInjectableFaults, is_same);
   if (!stays_open) return reopen(state, tick);
   copy_but_standing(state, state_);
   core_.breaks = state_.break_input.pending != 0 || watches_break(core_, state_);

@@ -240,6 +240,7 @@ void GateAxis::inject(std::size_t row, double value) {
 void GateAxis::clear_faults() {
   stop_here();
   axis_.clear_faults();
+  if (clock_.tick_open != 0) axis_.take_changes(tick());
   clock_.diverged_from = LegTimer::kNever;
   keep(base_);
 }

@@ -64,6 +64,7 @@ bool GateAxis::restore(std::span<const std::byte> bytes,
   log_.resize(told_count_);
   std::memcpy(log_.data(), events.data(), events.size());
   if (!std::ranges::all_of(log_, [this](const Logged& event) { return is_possible(event); })) return false;
+  axis_.restore(base_.axis);  // which may have another history
   go_back(base_);
   for (std::size_t n = 0; clock_.at < now_ || log_.size() < passed_; ++n) {
     if (n == kMostParts) return false;

@@ -284,6 +284,35 @@ TEST(GateAxis, ACurrentThatDiesIsTold) {
   EXPECT_NEAR(1e-12 * static_cast<double>(edges[0].at - 100 * kMicro), expected_s, 2e-12);  // a rounded time
 }
 
+// A current beyond the limit opens the legs 17 us later, shortly before the end of a tick; in the next one
+// the fault is cleared while it still flows, and it pulls the break again. Catches: a break input that waits
+// for the next tick unless somebody reads the state.
+TEST(GateAxis, AClearedBreakIsPulledAgainAtOnceWhoeverReads) {
+  AxisParameters p = standing_motor();
+  p.drive.inverter.break_current_a = 9.0;
+  p.drive.inverter.break_delay_s = 17e-6;
+  std::array<std::vector<GateEdge>, 2> told;
+  for (const bool reads : {false, true}) {
+    GateAxis axis(p, kPeriodNs, 2, 1, 0);
+    axis.set_leg(0, {.mode = LegMode::kHigh});
+    axis.set_leg(1, {.mode = LegMode::kLow});
+    std::array<GateEdge, 16> edges;
+    std::size_t count = axis.run(52 * kMicro, edges);
+    ASSERT_EQ(count, 1U);
+    EXPECT_EQ(edges[0].kind, EventKind::kBreak);
+    axis.clear_faults();
+    if (reads) {
+      EXPECT_GT(axis.look().truth.current_a.a, 9.5);
+    }
+    count = axis.run(85 * kMicro, edges);
+    told[reads ? 1 : 0].assign(edges.begin(), edges.begin() + static_cast<std::ptrdiff_t>(count));
+  }
+  ASSERT_EQ(told[0].size(), 1U);
+  ASSERT_EQ(told[1].size(), 1U);
+  EXPECT_TRUE(same(told[0][0], told[1][0]));
+  EXPECT_NEAR(1e-12 * static_cast<double>(told[0][0].at), 69e-6, 1e-10);
+}
+
 // Catches: a load of the tick that has ended, or the ramp of one that has not begun.
 TEST(GateAxis, ALoadIsReadFromTheInstantOfItsSetting) {
   GateAxis axis(turning_motor(), kPeriodNs, 4, 1, 0);

@@ -175,8 +175,8 @@ void print_comparison(const DemoReport& r) {
 void print_next_steps(const DemoReport& r) {
   const std::string self = program();
   fmt::print("\nwhat to try next:\n");
-  if (!fs::exists(whole_program()))
-    fmt::print("  ./bench tools    builds the program with all verbs, and the library\n");
+  if (own_executable() != whole_program())
+    fmt::print("  ./bench tools    builds the program with all verbs, and the library; then\n");
   fmt::print("  {} export {} --out move.csv\n", self, r.lockstep.recording);
   fmt::print("  {} serve            and in another terminal\n", self);
   fmt::print("  {} control --load 0.1@0.0365 --set machine.rotor_resistance_ohm=5.85\n", self);

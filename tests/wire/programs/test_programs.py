@@ -375,7 +375,8 @@ class Demo(CommandTest):
         self.assertIn(done.returncode, (OK, FAILED), done.stderr)
         hashes = [re.search(r"state hash +(\w+)", said)[1] for said in (done.stdout, self.demo().stdout)]
         self.assertEqual(hashes[0], hashes[1])
-        self.assertRegex(done.stdout, r"\n  \S*/drivebench new motor --help")
+        self.assertRegex(done.stdout, r"\n  ./bench tools .*\n(.*\n)+  \S*/drivebench new motor --help")
+        self.assertNotIn("bench tools", self.demo().stdout)
 
     def test_text_has_the_table_and_the_next_commands(self):
         """Catches: a demo that ends without naming its recordings."""
