@@ -284,9 +284,10 @@ TEST(GateAxis, ACurrentThatDiesIsTold) {
   EXPECT_NEAR(1e-12 * static_cast<double>(edges[0].at - 100 * kMicro), expected_s, 2e-12);  // a rounded time
 }
 
-// A current beyond the limit opens the legs 17 us later, shortly before the end of a tick; in the next one
-// the fault is cleared while it still flows, and it pulls the break again. Catches: a break input that waits
-// for the next tick unless somebody reads the state.
+// The break input opens the legs 17 us after the current has passed its limit, shortly before a tick ends. In
+// the next tick the client clears the fault while the current is still beyond the limit: the break input
+// opens the legs once more, 17 us later. Catches: a break input that waits for the next tick if the client
+// does not read the state.
 TEST(GateAxis, AClearedBreakIsPulledAgainAtOnceWhoeverReads) {
   AxisParameters p = standing_motor();
   p.drive.inverter.break_current_a = 9.0;
