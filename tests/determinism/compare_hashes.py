@@ -1,6 +1,7 @@
 #!/usr/bin/python3
 """Runs every hash_probe_* of a folder and compares their output: the state of the bench, tick by tick.
 
+hash_probe_*_arm64 run in the emulator that the second argument names.
 Builds with fused multiply-add (hash_probe_*_fused_*) must differ; if they did not, this test would prove nothing.
 """
 import os
@@ -20,8 +21,8 @@ def cpu_flags():
     return {word for line in text.splitlines() if line.startswith("flags") for word in line.split(":")[1].split()}
 
 
-def start(probe, environment=None):
-    return subprocess.Popen([probe], stdout=subprocess.PIPE, text=True, env=dict(os.environ, **(environment or {})))
+def start(*command, environment=None):
+    return subprocess.Popen(command, stdout=subprocess.PIPE, text=True, env=dict(os.environ, **(environment or {})))
 
 
 def first_difference(lines, reference):
@@ -31,7 +32,7 @@ def first_difference(lines, reference):
     return "prints another number of lines" if len(lines) != len(reference) else None
 
 
-def main(folder):
+def main(folder, emulator=None):
     probes = sorted(pathlib.Path(folder).glob("hash_probe_*"))
     names = {probe.name.removeprefix("hash_probe_"): probe for probe in probes}
     if "gcc_o0" not in names and "clang_o0" not in names:
@@ -40,14 +41,18 @@ def main(folder):
         for name in [name for name in names if "haswell" in name]:
             print(f"SKIPPED {name}: this CPU has no AVX2 and FMA")
             del names[name]
-    for kind in ("gcc", "clang"):
+    if emulator is None:
+        for name in [name for name in names if "arm64" in name]:
+            print(f"SKIPPED {name}: qemu-aarch64 was not there when the tests were configured")
+            del names[name]
+    for kind in ("gcc", "clang", "gcc_o2_arm64"):
         if not any(name.startswith(kind) for name in names):
             print(f"SKIPPED every build with {kind}: it was not there when the tests were configured")
 
-    runs = {name: start(probe) for name, probe in names.items()}
+    runs = {name: start(*([emulator] if "arm64" in name else []), probe) for name, probe in names.items()}
     for name in ("product", "clang_o2"):
         if name in names:
-            runs[name + " without FMA in the C library"] = start(names[name], OLD_CPU)
+            runs[name + " without FMA in the C library"] = start(names[name], environment=OLD_CPU)
     printed = {name: run.communicate()[0].splitlines() for name, run in runs.items()}
 
     reference = "gcc_o0" if "gcc_o0" in printed else "clang_o0"
@@ -67,4 +72,4 @@ def main(folder):
 
 
 if __name__ == "__main__":
-    main(sys.argv[1])
+    main(*sys.argv[1:])
