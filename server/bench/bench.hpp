@@ -53,7 +53,7 @@ struct BenchSetup {
 
 inline constexpr Tick kMaxQuickStop = 1'000'000;  ///< [ticks], so that the angle of the ramp has a cosine
 
-/// A sample in a ring, with its axis.
+/// A sample in a queue, with its axis.
 struct TickedSample {
   TickedSample() noexcept : axis(0), sample() {}
   TickedSample(std::uint32_t of, const Sample& taken) noexcept : axis(of), sample(taken) {}

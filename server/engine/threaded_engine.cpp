@@ -105,7 +105,7 @@ class ThreadedEngine final : public Engine {
   }
 
   void submit(const Input& input, Answer answer) override {
-    // Here, so that clients without the lease do not fill the ring; changes are checked by their sessions.
+    // Here, so that clients without the lease do not fill the queue; changes are checked by their sessions.
     if (input.axis < lease_mail_.size() && !may_be_scheduled(input.action)) {
       const Refused why = check_sender(input, holder_of(input.axis), takes_voltages(input.axis));
       if (why != Refused::kNot) return answer(has_room() ? why : Refused::kBusy, tick());
@@ -118,7 +118,7 @@ class ThreadedEngine final : public Engine {
       ends_.push_back({input, std::move(answer)});
       return;
     }
-    // Refused commands, which a controller may send without end, leave half of the ring free.
+    // Refused commands, which a controller may send without end, leave half of the queue free.
     if (std::holds_alternative<RefusedCommand>(input.action) && requests_.room() <= kRequestCapacity / 2) {
       return answer(Refused::kBusy, tick());
     }
@@ -383,7 +383,7 @@ class ThreadedEngine final : public Engine {
       rows[row].set(p, mail.in_force[row]);
   }
 
-  // In free mode a wake-up costs more than several ticks; the ring holds the events in between.
+  // In free mode a wake-up costs more than several ticks; the queue holds the events in between.
   static constexpr std::size_t kEventsPerWake = 1024;
 
   struct Waiting {
@@ -392,7 +392,7 @@ class ThreadedEngine final : public Engine {
     std::optional<std::uint32_t> passed_axis;   // whose lease the request passes on
   };
 
-  /// The end of a lease that found the ring full; its sender does not try again, so it waits here.
+  /// The end of a lease that found the queue full; its sender does not try again, so it waits here.
   struct LeaseEnd {
     Input input;
     Answer answer;
@@ -405,8 +405,8 @@ class ThreadedEngine final : public Engine {
 
   std::optional<Tick> max_ticks_;
   Tick ticks_per_wake_;
-  SpscRing<Input> requests_;
-  SpscRing<TickEvent> events_;
+  SpscQueue<Input> requests_;
+  SpscQueue<TickEvent> events_;
   TickTap tap_;
   Bench bench_;
   std::deque<CommandMail> command_mail_;

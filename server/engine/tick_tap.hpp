@@ -6,7 +6,7 @@
 
 #include "server/engine/tick_edges.hpp"
 #include "server/recording/recorder.hpp"
-#include "server/recording/spsc_ring.hpp"
+#include "server/recording/spsc_queue.hpp"
 
 namespace drivebench {
 
@@ -28,14 +28,14 @@ using TickEvent = std::variant<TickedSample, RequestOutcome, AxisEdges, RunEnded
 /// Passes inputs to the recorder, and samples to the recorder and the I/O thread.
 class TickTap final : public BenchObserver {
  public:
-  TickTap(Recorder* recorder, SpscRing<TickEvent>& events) : recorder_(recorder), events_(events) {}
+  TickTap(Recorder* recorder, SpscQueue<TickEvent>& events) : recorder_(recorder), events_(events) {}
   void on_input(Tick now, const Input& input) noexcept override {
     if (recorder_ != nullptr) recorder_->on_input(now, input);
   }
   void on_sample(std::uint32_t axis, const Sample& sample) noexcept override {
     if (recorder_ != nullptr) recorder_->on_sample(axis, sample);
     if (bench_ != nullptr) events_.emplace(std::in_place_type<AxisEdges>, axis, edges_of(*bench_, axis));
-    // With a full ring viewers lose a sample, and the tick does not wait.
+    // With a full queue viewers lose a sample, and the tick does not wait.
     events_.emplace(std::in_place_type<TickedSample>, axis, sample);
   }
   /// Sends the encoder edges of each tick before its samples from now on.
@@ -43,7 +43,7 @@ class TickTap final : public BenchObserver {
 
  private:
   Recorder* recorder_;
-  SpscRing<TickEvent>& events_;
+  SpscQueue<TickEvent>& events_;
   const Bench* bench_ = nullptr;
 };
 

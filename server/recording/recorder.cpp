@@ -12,7 +12,7 @@ namespace {
 
 constexpr auto kIdleSleep = std::chrono::milliseconds(1);
 
-constexpr std::size_t kMaxRingBytes = std::size_t{256} << 20;
+constexpr std::size_t kMaxQueueBytes = std::size_t{256} << 20;
 
 /// The most entries between two reads of the clock.
 constexpr std::size_t kEntriesPerLook = 4096;
@@ -25,17 +25,17 @@ static_assert(kInputsPerLook >= 256 + 3 * kMaxAxes + kMaxAxisEvents);
 
 }  // namespace
 
-std::size_t recorder_ring_entries(const BenchConfig& config) noexcept {
+std::size_t recorder_queue_entries(const BenchConfig& config) noexcept {
   const double ticks = 2e9 / static_cast<double>(config.setup.period_ns);
   const auto entries = static_cast<std::size_t>(2.0 * ticks * static_cast<double>(config.axes.size())) + 1024;
-  return std::min(entries, kMaxRingBytes / sizeof(RecordedEntry));
+  return std::min(entries, kMaxQueueBytes / sizeof(RecordedEntry));
 }
 
 Recorder::Recorder(const std::filesystem::path& file, const BenchConfig& config,
                    std::initializer_list<RecordingAttachment> attachments, const RecordingOptions& options)
     // Without real time a tick may wait for a page, and a short run needs few of them.
-    : ring_(recorder_ring_entries(config),
-            config.mode == RunMode::kRealtime ? Pages::kTouched : Pages::kUntouched),
+    : queue_(recorder_queue_entries(config),
+             config.mode == RunMode::kRealtime ? Pages::kTouched : Pages::kUntouched),
       room_for_tick_(config.axes.size() + kInputsPerLook),
       writer_(std::make_unique<RecordingWriter>(file, config, attachments, options)) {
   tell_state();
@@ -48,16 +48,16 @@ Recorder::~Recorder() {
 }
 
 void Recorder::on_input(Tick now, const Input& input) noexcept {
-  count_gap(!ring_.emplace(std::in_place_type<ReceivedInput>, now, input));
+  count_gap(!queue_.emplace(std::in_place_type<ReceivedInput>, now, input));
 }
 
 void Recorder::on_sample(std::uint32_t axis, const Sample& sample) noexcept {
   if (new_base_) offer_time_base();
-  count_gap(!ring_.emplace(std::in_place_type<TickedSample>, axis, sample));
+  count_gap(!queue_.emplace(std::in_place_type<TickedSample>, axis, sample));
 }
 
 void Recorder::offer_time_base() noexcept {
-  if (ring_.emplace(std::in_place_type<TimeBase>, *new_base_)) new_base_.reset();
+  if (queue_.emplace(std::in_place_type<TimeBase>, *new_base_)) new_base_.reset();
 }
 
 void Recorder::count_gap(bool lost) noexcept {
@@ -76,9 +76,9 @@ void Recorder::wait_for_room() noexcept {
 
 bool Recorder::drain(std::size_t most) noexcept {
   std::size_t taken = 0;
-  for (const RecordedEntry* entry = nullptr; taken < most && (entry = ring_.front()) != nullptr; ++taken) {
+  for (const RecordedEntry* entry = nullptr; taken < most && (entry = queue_.front()) != nullptr; ++taken) {
     writer_->write(*entry);
-    ring_.pop();
+    queue_.pop();
   }
   return taken > 0;
 }
@@ -119,7 +119,7 @@ std::string Recorder::remarks() const {
 Verdict Recorder::finish(const Verdict& verdict) {
   stop_.store(true);
   if (thread_.joinable()) thread_.join();
-  drain(ring_.capacity());
+  drain(queue_.capacity());
   tell_state();
   Verdict final_verdict = verdict;
   final_verdict.gaps = gaps();

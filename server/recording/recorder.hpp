@@ -16,13 +16,13 @@
 #include "server/pacing/verdict.hpp"
 #include "server/recording/recording.hpp"
 #include "server/recording/recording_file.hpp"
-#include "server/recording/spsc_ring.hpp"
+#include "server/recording/spsc_queue.hpp"
 
 namespace drivebench {
 
 class RecordingWriter;
 
-/// An input in the ring.
+/// An input in the queue.
 struct ReceivedInput {
   ReceivedInput(Tick at, const Input& taken) noexcept : received(at), input(taken) {}
   Tick received;
@@ -44,13 +44,13 @@ struct RecordingOptions {
   bool own_thread = true;               ///< false: the caller calls work() regularly
 };
 
-/// The size of the ring in entries: a sample and a command per tick and axis for two seconds, at most 256
+/// The size of the queue in entries: a sample and a command per tick and axis for two seconds, at most 256
 /// MiB.
-std::size_t recorder_ring_entries(const BenchConfig& config) noexcept;
+std::size_t recorder_queue_entries(const BenchConfig& config) noexcept;
 
-/// Writes every sample and every input of a run to MCAP files, on a thread of its own behind a bounded ring.
-/// The tick only copies into the ring; when the ring is full the entry is lost and counted. The thread writes
-/// the entries after every 100 ms of plant time (1 s in free mode) by default and syncs the file every
+/// Writes every sample and every input of a run to MCAP files, on a thread of its own behind a bounded queue.
+/// The tick only copies into the queue; when the queue is full the entry is lost and counted. The thread
+/// writes the entries after every 100 ms of plant time (1 s in free mode) by default and syncs the file every
 /// second.
 class Recorder final : public BenchObserver {
  public:
@@ -69,15 +69,15 @@ class Recorder final : public BenchObserver {
     offer_time_base();
   }
 
-  /// Whether the ring has room for a tick. Called by the tick thread between ticks.
-  bool has_room() noexcept { return ring_.room() >= room_for_tick_; }
+  /// Whether the queue has room for a tick. Called by the tick thread between ticks.
+  bool has_room() noexcept { return queue_.room() >= room_for_tick_; }
   /// Waits until has_room(). For runs without real time.
   void wait_for_room() noexcept;
 
-  /// Writes some entries of the ring and syncs when due; false if the ring was empty.
+  /// Writes some entries of the queue and syncs when due; false if the queue was empty.
   bool work() noexcept;
 
-  /// Entries lost because the ring was full or the disk refused them.
+  /// Entries lost because the queue was full or the disk refused them.
   std::uint64_t gaps() const noexcept { return gaps_.load(std::memory_order_relaxed); }
   /// Whether the recording has ended before the run, because the disk is full or has failed.
   bool is_over() const noexcept { return is_over_.load(std::memory_order_relaxed); }
@@ -88,7 +88,7 @@ class Recorder final : public BenchObserver {
   /// The damage by disks and other programs, in a sentence; empty: none.
   std::string remarks() const;
 
-  /// Drains the ring, writes the verdict and closes the file; afterwards the state above is final. Returns
+  /// Drains the queue, writes the verdict and closes the file; afterwards the state above is final. Returns
   /// the verdict with what became of the recording.
   Verdict finish(const Verdict& verdict);
 
@@ -99,9 +99,9 @@ class Recorder final : public BenchObserver {
   void offer_time_base() noexcept;
   void tell_state() noexcept;
 
-  SpscRing<RecordedEntry> ring_;
+  SpscQueue<RecordedEntry> queue_;
   std::size_t room_for_tick_;
-  std::optional<TimeBase> new_base_;  // tick thread: not in the ring yet, which was full
+  std::optional<TimeBase> new_base_;  // tick thread: not in the queue yet, which was full
   std::unique_ptr<RecordingWriter> writer_;
   std::atomic<std::uint64_t> gaps_{0};
   std::atomic<bool> is_over_{false};

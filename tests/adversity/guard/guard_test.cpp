@@ -21,7 +21,7 @@
 #include "server/engine/engine.hpp"
 #include "server/engine/mailbox.hpp"
 #include "server/recording/recorder.hpp"
-#include "server/recording/spsc_ring.hpp"
+#include "server/recording/spsc_queue.hpp"
 #include "tests/adversity/guard/guarded.hpp"
 #include "tests/server/recording/run_config.hpp"
 
@@ -46,7 +46,7 @@ class BusyRun {
   void batch() noexcept {
     for (Tick n = 0; n < kBatch; ++n) {
       const Tick tick = bench_.tick();
-      if (tick % 500 == 0) {  // inputs that come through the ring of requests
+      if (tick % 500 == 0) {  // inputs that come through the queue of requests
         requests_.push({.tick = tick + 100, .axis = 0, .owner = kOwner, .action = LoadChange{0.01, 50}});
         requests_.push({.tick = 0, .axis = 1, .owner = kOwner, .action = write_});
         requests_.push({.tick = tick + 7, .axis = 0, .owner = kOwner, .action = ramp_});
@@ -78,7 +78,7 @@ class BusyRun {
   Bench& bench_;
   const ParameterWrite write_ = write_of(servo_axis(), "machine.rotor_resistance_ohm", 3.9);
   const ParameterWrite ramp_ = write_of(servo_axis(), "machine.stator_resistance_ohm", 1.7, 300);
-  SpscRing<Input> requests_{256};
+  SpscQueue<Input> requests_{256};
   Mailbox<Command> mailbox_;
 };
 

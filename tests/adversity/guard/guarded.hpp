@@ -9,7 +9,7 @@
 
 #include "server/bench/bench.hpp"
 #include "server/recording/recorder.hpp"
-#include "server/recording/spsc_ring.hpp"
+#include "server/recording/spsc_queue.hpp"
 #include "tests/server/recording/run_config.hpp"
 
 /// Shared by the tests under the preloaded guard.
@@ -33,7 +33,7 @@ struct Guard {
   const char* (*first_hit)() = find<const char*()>("guard_first_hit");
 };
 
-/// The work of the threaded engine's tap: a copy into the recorder's ring, one into the ring to the I/O
+/// The work of the threaded engine's tap: a copy into the recorder's queue, one into the queue to the I/O
 /// thread.
 class Tap : public BenchObserver {
  public:
@@ -46,14 +46,14 @@ class Tap : public BenchObserver {
     if (recorder_ != nullptr) recorder_->on_sample(axis, sample);
     events.push(sample);
   }
-  /// Outside the tick: the work of the threads behind the rings.
+  /// Outside the tick: the work of the threads behind the queues.
   void drain() {
     while (events.front() != nullptr)
       events.pop();
     if (recorder_ != nullptr) recorder_->wait_for_room();
   }
 
-  SpscRing<Event> events{4096};
+  SpscQueue<Event> events{4096};
 
  private:
   Recorder* recorder_;

@@ -8,7 +8,7 @@
 
 #include "server/bench/bench.hpp"
 #include "server/recording/recorder.hpp"
-#include "server/recording/spsc_ring.hpp"
+#include "server/recording/spsc_queue.hpp"
 #include "tests/benchmark/harness/canary.hpp"
 #include "tests/benchmark/harness/machine.hpp"
 #include "tests/benchmark/harness/server.hpp"
@@ -26,24 +26,24 @@ constexpr std::size_t kRounds = 20;
 constexpr int kRunUpTicks = 16'000;  // 2 s: the line start is over
 constexpr Owner kController = 1;
 
-/// Copies what the bench reports into a ring as large as the recorder's: too large for the inner caches, as
-/// there. It is emptied between batches, by the recorder's thread in the product.
-class RingTap final : public BenchObserver {
+/// Copies what the bench reports into a queue as large as the recorder's. It is emptied between batches, by
+/// the recorder's thread in the product.
+class QueueTap final : public BenchObserver {
  public:
   void on_input(Tick now, const Input& input) noexcept override {
-    ring_.emplace(std::in_place_type<ReceivedInput>, now, input);
+    queue_.emplace(std::in_place_type<ReceivedInput>, now, input);
   }
   void on_sample(std::uint32_t axis, const Sample& sample) noexcept override {
-    ring_.emplace(std::in_place_type<TickedSample>, axis, sample);
+    queue_.emplace(std::in_place_type<TickedSample>, axis, sample);
   }
 
   void empty() noexcept {
-    while (ring_.front() != nullptr)
-      ring_.pop();
+    while (queue_.front() != nullptr)
+      queue_.pop();
   }
 
  private:
-  SpscRing<RecordedEntry> ring_{17'024};
+  SpscQueue<RecordedEntry> queue_{17'024};
 };
 
 /// The bench under command, and the bare motor at the same voltages.
@@ -119,7 +119,7 @@ class Race {
   }
 
   BenchConfig config_;
-  RingTap tap_;
+  QueueTap tap_;
   Bench bench_;
   BareInduction motor_;
   int substeps_;

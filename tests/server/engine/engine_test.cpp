@@ -45,7 +45,7 @@ BenchConfig free_bench() {
   return config;
 }
 
-// Catches: a thread, a ring or a recorder that changes the run by a bit; an end that comes early, late or
+// Catches: a thread, a queue or a recorder that changes the run by a bit; an end that comes early, late or
 // never.
 TEST(ThreadedEngine, DET_01_AFreeRunIsTheDirectRunBitForBit) {
   constexpr Tick kTicks = 5000;
@@ -191,7 +191,7 @@ TEST(ThreadedEngine, TooManyRequestsAreRefusedAsBusy) {
   config.mode = RunMode::kFree;
   asio::io_context io(1);
   const auto engine = make_threaded_engine(config, nullptr, io, std::nullopt);
-  // While nothing is drained here, the bench can report at most as many outcomes as its ring holds.
+  // While nothing is drained here, the bench can report at most as many outcomes as its queue holds.
   constexpr int kRequests = 20'000;
   int busy = 0;
   int answered = 0;

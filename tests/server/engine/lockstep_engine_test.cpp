@@ -125,7 +125,7 @@ TEST(LockstepEngine, REC_06_TimeWaitsForASlowDiskAndTheIoThreadDoesNot) {
   Engine& engine = *run.engine;
   ask(engine, lease(LeaseAction::kAcquire));
   const Tick stands_at = run.stand();
-  EXPECT_GT(stands_at, 8000) << "the ring holds more than a second";
+  EXPECT_GT(stands_at, 8000) << "the queue holds more than a second";
   for (int i = 0; i < 5; ++i)
     run.io.run_one();
   EXPECT_EQ(engine.tick(), stands_at);
@@ -139,7 +139,7 @@ TEST(LockstepEngine, REC_06_TimeWaitsForASlowDiskAndTheIoThreadDoesNot) {
 // is taken and not given.
 TEST(LockstepEngine, REC_06_EveryInputTakenWhileTheDiskStandsStillIsRecorded) {
   BenchConfig config = servo_bench(2);
-  config.setup.lease_ticks = 1'000'000;  // longer than it takes to fill the ring
+  config.setup.lease_ticks = 1'000'000;  // longer than it takes to fill the queue
   SlowDiskRun run(config);
   Engine& engine = *run.engine;
   // Axis 1 is latched, so that time goes on without its commands: they may answer any sample since.

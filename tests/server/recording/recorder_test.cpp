@@ -193,7 +193,7 @@ TEST(Recorder, REC_07_TheFileMustBeNew) {
   EXPECT_FALSE(std::filesystem::exists(folder / "elsewhere"));
 }
 
-// Catches: a full ring that blocks, overwrites or forgets in silence. The ring is small here (a period of a
+// Catches: a full queue that blocks, overwrites or forgets in silence. The queue is small here (a period of a
 // second), and a tick that only copies is faster than a thread that encodes and writes.
 TEST(Recorder, RT_04_AFullRingLosesEntriesAndCountsThem) {
   const TestFolder folder;

@@ -350,7 +350,7 @@ void feed(Recorder& recorder, std::uint64_t from, std::uint64_t to) {
   }
 }
 
-// Catches: a ring that holds less than two seconds of a bench under command; a plant that waits for the disk;
+// Catches: a queue that holds less than two seconds of a bench under command; a plant that waits for the disk;
 // entries lost in silence. The disk stands still for five seconds of plant time.
 TEST(RecordingDisk, REC_06_LIMIT_10_TwoSecondsOfAStallCostNothingAndTheRestIsCounted) {
   constexpr std::uint64_t kSecond = 8000;
@@ -380,18 +380,18 @@ TEST(RecordingDisk, REC_06_LIMIT_10_TwoSecondsOfAStallCostNothingAndTheRestIsCou
   }
 }
 
-// Catches: a bench that is too fast, or has too many axes, for a ring of fixed size.
+// Catches: a bench that is too fast, or has too many axes, for a queue of fixed size.
 TEST(RecordingDisk, LIMIT_10_TheRingHoldsTwoSecondsOfEveryBench) {
   for (const auto& entry : std::filesystem::directory_iterator(DRIVEBENCH_BENCHES)) {
     const BenchConfig config = load_config(entry.path().string());
     const double ticks = 2e9 / static_cast<double>(config.setup.period_ns);
-    EXPECT_GE(static_cast<double>(recorder_ring_entries(config)),
+    EXPECT_GE(static_cast<double>(recorder_queue_entries(config)),
               ticks * 2.0 * static_cast<double>(config.axes.size()))
         << entry.path();
   }
   BenchConfig large = servo_bench(64);
   large.setup.period_ns = 1000;
-  EXPECT_LE(recorder_ring_entries(large) * sizeof(RecordedEntry), std::size_t{256} << 20);
+  EXPECT_LE(recorder_queue_entries(large) * sizeof(RecordedEntry), std::size_t{256} << 20);
 }
 
 }  // namespace
