@@ -1,5 +1,6 @@
 #include "plant/sensors/encoder.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 
@@ -192,10 +193,26 @@ bool Encoder::is_sound(const InjectedFaults& faults) const noexcept {
   return size == 0.0 && !p_.swapped;
 }
 
+bool Encoder::keeps_count(const EncoderState& state, std::span<const AngleSegment> segments,
+                          std::int64_t turn) const noexcept {
+  constexpr double kAstray = 0.15;  // above 4/27
+  const auto count = static_cast<double>(state.count + state.ahead - turn * p_.counts_per_revolution);
+  const auto is_within = [count](double place, double astray) noexcept {
+    return place - astray >= count && place + astray < count + 1.0;
+  };
+  if (!is_within(position(segments.back().end_rad), 0.0)) return false;
+  return std::ranges::all_of(segments, [&](const AngleSegment& s) noexcept {
+    const double slopes_rad = s.duration_s * (std::abs(s.start_rad_s) + std::abs(s.end_rad_s));
+    const double astray = kAstray * counts_per_rad_ * slopes_rad;
+    return is_within(position(s.start_rad), astray) && is_within(position(s.end_rad), astray);
+  });
+}
+
 void Encoder::follow(EncoderState& state, std::span<const AngleSegment> segments, Tick tick,
                      std::int64_t turn, const InjectedFaults& faults) const noexcept {
   if (segments.empty()) return;
   if (is_sound(faults)) {
+    if (keeps_count(state, segments, turn)) return;
     follow_with(SoundView{}, state, segments, tick, turn);
   } else {
     follow_with(view_of(faults), state, segments, tick, turn);
@@ -206,6 +223,7 @@ void Encoder::count(EncoderState& state, std::span<const AngleSegment> segments,
                     const InjectedFaults& faults) const noexcept {
   if (segments.empty()) return;
   if (is_sound(faults)) {
+    if (keeps_count(state, segments, turn)) return;
     follow_with(CountView{}, state, segments, tick, turn);
   } else {
     follow_with(view_of(faults), state, segments, tick, turn);

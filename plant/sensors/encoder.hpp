@@ -135,6 +135,11 @@ class Encoder {
   struct Newest;
 
   bool is_sound(const InjectedFaults& faults) const noexcept;
+  /// Whether a sound encoder has no edge on these segments, as while the shaft stands: nothing changes then.
+  /// It asks no more of a segment than its ends; between them the cubic goes at most 4/27 of its end slopes
+  /// astray. False where that does not tell.
+  bool keeps_count(const EncoderState& state, std::span<const AngleSegment> segments,
+                   std::int64_t turn) const noexcept;
   View view_of(const InjectedFaults& faults) const noexcept;
   template <class AnyView>
   void follow_with(const AnyView& view, EncoderState& state, std::span<const AngleSegment> segments,

@@ -120,7 +120,8 @@ TEST(EncoderFaults, TheListOfEdgesAddsUpToTheCountWhateverIsInjected) {
 }
 
 // A fault that touches neither count nor edges sends them through the code for faults. Catches: a sound
-// encoder that is not the one without faults, bit for bit.
+// encoder that is not the one without faults, bit for bit; an edge that is not seen because it comes while
+// the shaft creeps, or goes to and fro about a boundary.
 TEST(EncoderFaults, TheCodeForFaultsGivesTheBitsOfTheSoundEncoder) {
   std::mt19937_64 engine(42);
   std::uniform_real_distribution<double> draw(-1.0, 1.0);
@@ -128,8 +129,9 @@ TEST(EncoderFaults, TheCodeForFaultsGivesTheBitsOfTheSoundEncoder) {
   Shaft other(3.0);
   other.faults.encoder_index_missing = 1.0;
   for (int n = 0; n < 20'000; ++n) {
-    const double speed_rad_s = 600.0 * draw(engine);
-    const double acceleration = 1e7 * draw(engine);
+    const double part = n % 2 == 0 ? 1.0 : 0.01;
+    const double speed_rad_s = 600.0 * part * draw(engine);
+    const double acceleration = 1e7 * part * draw(engine);
     sound.move(speed_rad_s, acceleration);
     other.move(speed_rad_s, acceleration);
     ASSERT_EQ(sound.state.count, other.state.count);
