@@ -196,6 +196,7 @@ bool Encoder::is_sound(const InjectedFaults& faults) const noexcept {
 bool Encoder::keeps_count(const EncoderState& state, std::span<const AngleSegment> segments,
                           std::int64_t turn) const noexcept {
   constexpr double kAstray = 0.15;  // above 4/27
+  constexpr double kRounding = 1e-14;
   const auto count = static_cast<double>(state.count + state.ahead - turn * p_.counts_per_revolution);
   const auto is_within = [count](double place, double astray) noexcept {
     return place - astray >= count && place + astray < count + 1.0;
@@ -203,7 +204,8 @@ bool Encoder::keeps_count(const EncoderState& state, std::span<const AngleSegmen
   if (!is_within(position(segments.back().end_rad), 0.0)) return false;
   return std::ranges::all_of(segments, [&](const AngleSegment& s) noexcept {
     const double slopes_rad = s.duration_s * (std::abs(s.start_rad_s) + std::abs(s.end_rad_s));
-    const double astray = kAstray * counts_per_rad_ * slopes_rad;
+    const double rounding = slopes_rad > 0.0 ? kRounding * (1.0 + std::abs(count)) : 0.0;
+    const double astray = kAstray * counts_per_rad_ * slopes_rad + rounding;
     return is_within(position(s.start_rad), astray) && is_within(position(s.end_rad), astray);
   });
 }

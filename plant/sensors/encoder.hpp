@@ -135,9 +135,10 @@ class Encoder {
   struct Newest;
 
   bool is_sound(const InjectedFaults& faults) const noexcept;
-  /// Whether a sound encoder has no edge on these segments, as while the shaft stands: nothing changes then.
-  /// It asks no more of a segment than its ends; between them the cubic goes at most 4/27 of its end slopes
-  /// astray. False where that does not tell.
+  /// Whether the count of a sound encoder surely stays the same on these segments, as while the shaft stands:
+  /// then follow() would change nothing. It looks at the ends of a segment alone: between them the cubic
+  /// leaves their range by at most 4/27 of the sum of its end slopes. Where a cubic turns, rounding may put
+  /// an edge; false close to one.
   bool keeps_count(const EncoderState& state, std::span<const AngleSegment> segments,
                    std::int64_t turn) const noexcept;
   View view_of(const InjectedFaults& faults) const noexcept;

@@ -12,7 +12,9 @@ namespace {
 
 constexpr auto kIdleSleep = std::chrono::milliseconds(1);
 
-constexpr std::size_t kMaxQueueBytes = std::size_t{256} << 20;
+/// A few blocks are left over for the last ones of the queue and its lists.
+constexpr std::size_t kMaxQueueEntries =
+    (std::size_t{256} << 20) / sizeof(RecordedEntry) - 4 * SpscQueue<RecordedEntry>::kBlockEntries;
 
 /// The most entries between two reads of the clock.
 constexpr std::size_t kEntriesPerLook = 4096;
@@ -28,7 +30,7 @@ static_assert(kInputsPerLook >= 256 + 3 * kMaxAxes + kMaxAxisEvents);
 std::size_t recorder_queue_entries(const BenchConfig& config) noexcept {
   const double ticks = 2e9 / static_cast<double>(config.setup.period_ns);
   const auto entries = static_cast<std::size_t>(2.0 * ticks * static_cast<double>(config.axes.size())) + 1024;
-  return std::min(entries, kMaxQueueBytes / sizeof(RecordedEntry));
+  return std::min(entries, kMaxQueueEntries);
 }
 
 Recorder::Recorder(const std::filesystem::path& file, const BenchConfig& config,

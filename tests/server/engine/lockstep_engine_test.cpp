@@ -184,7 +184,7 @@ TEST(LockstepEngine, REC_06_EveryInputTakenWhileTheDiskStandsStillIsRecorded) {
 }
 
 // Catches: room that is looked for only where a tick is due, or where a lease is.
-TEST(LockstepEngine, REC_06_SessionsWithoutALeaseDoNotFillTheRingOfAnIdleBench) {
+TEST(LockstepEngine, REC_06_SessionsWithoutALeaseDoNotFillTheQueueOfAnIdleBench) {
   SlowDiskRun run(servo_bench());
   run.disk.stall(true);
   for (int i = 0; i < 100'000; ++i) {

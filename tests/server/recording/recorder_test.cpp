@@ -195,7 +195,7 @@ TEST(Recorder, REC_07_TheFileMustBeNew) {
 
 // Catches: a full queue that blocks, overwrites or forgets in silence. The queue is small here (a period of a
 // second), and a tick that only copies is faster than a thread that encodes and writes.
-TEST(Recorder, RT_04_AFullRingLosesEntriesAndCountsThem) {
+TEST(Recorder, RT_04_AFullQueueLosesEntriesAndCountsThem) {
   const TestFolder folder;
   BenchConfig config = servo_bench();
   config.setup.period_ns = 1'000'000'000;

@@ -350,8 +350,8 @@ void feed(Recorder& recorder, std::uint64_t from, std::uint64_t to) {
   }
 }
 
-// Catches: a queue that holds less than two seconds of a bench under command; a plant that waits for the disk;
-// entries lost in silence. The disk stands still for five seconds of plant time.
+// Catches: a queue that holds less than two seconds of a bench under command; a plant that waits for the
+// disk; entries lost in silence. The disk stands still for five seconds of plant time.
 TEST(RecordingDisk, REC_06_LIMIT_10_TwoSecondsOfAStallCostNothingAndTheRestIsCounted) {
   constexpr std::uint64_t kSecond = 8000;
   for (const std::uint64_t seconds : {2u, 5u}) {
@@ -381,7 +381,7 @@ TEST(RecordingDisk, REC_06_LIMIT_10_TwoSecondsOfAStallCostNothingAndTheRestIsCou
 }
 
 // Catches: a bench that is too fast, or has too many axes, for a queue of fixed size.
-TEST(RecordingDisk, LIMIT_10_TheRingHoldsTwoSecondsOfEveryBench) {
+TEST(RecordingDisk, LIMIT_10_TheQueueHoldsTwoSecondsOfEveryBench) {
   for (const auto& entry : std::filesystem::directory_iterator(DRIVEBENCH_BENCHES)) {
     const BenchConfig config = load_config(entry.path().string());
     const double ticks = 2e9 / static_cast<double>(config.setup.period_ns);
