@@ -137,8 +137,8 @@ class Encoder {
   bool is_sound(const InjectedFaults& faults) const noexcept;
   /// Whether the count of a sound encoder surely stays the same on these segments, as while the shaft stands:
   /// then follow() would change nothing. It looks at the ends of a segment alone: between them the cubic
-  /// leaves their range by at most 4/27 of the sum of its end slopes. Where a cubic turns, rounding may put
-  /// an edge; false close to one.
+  /// leaves their range by at most 4/27 of the sum of its end slopes. It is false close to an edge, because
+  /// rounding may put one where a cubic turns.
   bool keeps_count(const EncoderState& state, std::span<const AngleSegment> segments,
                    std::int64_t turn) const noexcept;
   View view_of(const InjectedFaults& faults) const noexcept;

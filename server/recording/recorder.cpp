@@ -12,7 +12,7 @@ namespace {
 
 constexpr auto kIdleSleep = std::chrono::milliseconds(1);
 
-/// A few blocks are left over for the last ones of the queue and its lists.
+/// Of 256 MiB; four blocks are left for those that the queue has beyond its capacity, and for its lists.
 constexpr std::size_t kMaxQueueEntries =
     (std::size_t{256} << 20) / sizeof(RecordedEntry) - 4 * SpscQueue<RecordedEntry>::kBlockEntries;
 

@@ -20,7 +20,7 @@ enum class Pages { kTouched, kUntouched };
 ///
 /// The entries lie in blocks. The block that the consumer has emptied last is the next one to be filled: it
 /// is still in the caches of the processor, and a queue that is rarely long uses few blocks however many it
-/// has. (A ring would go through all of its memory, which costs as much as a tick of the bench does.)
+/// has. A ring goes through all of its memory instead.
 template <class T>
 class SpscQueue {
   static_assert(std::is_trivially_copyable_v<T>);
