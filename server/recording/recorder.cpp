@@ -12,9 +12,10 @@ namespace {
 
 constexpr auto kIdleSleep = std::chrono::milliseconds(1);
 
-/// Of 256 MiB; four blocks are left for those that the queue has beyond its capacity, and for its lists.
+constexpr std::size_t kMaxQueueBytes = std::size_t{256} << 20;
+/// Four blocks are left for those that the queue has beyond its capacity, and for its lists.
 constexpr std::size_t kMaxQueueEntries =
-    (std::size_t{256} << 20) / sizeof(RecordedEntry) - 4 * SpscQueue<RecordedEntry>::kBlockEntries;
+    kMaxQueueBytes / sizeof(RecordedEntry) - 4 * SpscQueue<RecordedEntry>::kBlockEntries;
 
 /// The most entries between two reads of the clock.
 constexpr std::size_t kEntriesPerLook = 4096;

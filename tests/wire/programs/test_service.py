@@ -92,9 +92,9 @@ class Unit(WireTest):
         return {key: [value for other, value in lines if other == key] for key, _ in lines}
 
     @staticmethod
-    def largest_ring_mib():
+    def largest_queue_mib():
         recorder = (REPOSITORY / "server/recording/recorder.cpp").read_text(encoding="utf-8")
-        return int(re.search(r"kMaxRingBytes = std::size_t\{(\d+)\} << 20;", recorder)[1])
+        return int(re.search(r"kMaxQueueBytes = std::size_t\{(\d+)\} << 20;", recorder)[1])
 
     def test_sec_06_the_unit_gives_the_rights_of_real_time_and_no_others(self):
         """Catches: a service with more rights than it needs, one that is started again and again with a wrong bench file, or
@@ -103,7 +103,7 @@ class Unit(WireTest):
         for key in ("CapabilityBoundingSet", "AmbientCapabilities"):
             self.assertEqual(set(keys[key][0].split()), {"CAP_SYS_NICE", "CAP_IPC_LOCK"}, key)
         for key, value in {"Type": "notify", "NoNewPrivileges": "yes", "ProtectSystem": "strict", "PrivateTmp": "yes",
-                           "LimitMEMLOCK": "infinity", "MemoryMax": f"{128 + 2 * self.largest_ring_mib()}M", "Restart": "on-failure", "RestartPreventExitStatus": "2"}.items():
+                           "LimitMEMLOCK": "infinity", "MemoryMax": f"{128 + 2 * self.largest_queue_mib()}M", "Restart": "on-failure", "RestartPreventExitStatus": "2"}.items():
             self.assertEqual(keys[key], [value], key)
         self.assertNotIn(keys["User"][0], ("", "root"))
         self.assertNotIn("RestrictRealtime", keys)
