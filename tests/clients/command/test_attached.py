@@ -55,7 +55,8 @@ kind = "eventually"
 condition = "speed_rad_s > 5"
 """
 
-# A drive on the bus: waits for its bench, drives until it goes, and waits for the next.
+# A drive on the bus: waits for its bench, drives until it goes, and waits for the next. One that leaves comes back when that run
+# has ended: a late tick makes the runner try again.
 DRIVE = """import sys, time
 import drivebench
 link, behaviour = sys.argv[1:]
@@ -76,7 +77,7 @@ while True:
                     commands += 1
                 except drivebench.Refused:
                     bench.newest()
-        time.sleep(60)
+        time.sleep(1)
     except drivebench.DrivebenchError:
         time.sleep(0.01)
 """
