@@ -5,7 +5,7 @@ import assert from "node:assert/strict";
 import test from "node:test";
 import { page } from "./sources.mjs";
 
-const { wordsOf, verdictOf, summaryOf, countsOf, identificationIn, isInside, amplitude, drawnSpeed, gatesOf, wavesOf, fieldsOf, targetOf, Leases, Changes, pb } = page;
+const { wordsOf, verdictOf, summaryOf, countsOf, identificationIn, isInside, amplitude, drawnSpeed, gatesOf, wavesOf, fieldsOf, targetOf, Leases, Changes, Wire, pb } = page;
 
 // Catches: a common voltage of the terminals that counts as amplitude, the sum of three phases for their vector.
 test("the amplitude of terminals", () => {
@@ -44,6 +44,52 @@ test("a renewal that crosses the giving back", async (t) => {
   await refuse();
   assert.deepEqual([told.at(-1), leases.holds(0)], ["lease: not yours", false]);
   leases.end();
+});
+
+// Catches: a page that waits for ever after its token, because the end of the session before, which came late, ended the hello of the
+// new one, too.
+test("a session that was turned away ends after the next has begun", async () => {
+  const sockets = [];
+  class Socket {
+    constructor() {
+      sockets.push(this);
+      this.readyState = Socket.CONNECTING;
+    }
+    open() {
+      this.readyState = Socket.OPEN;
+      return this.onopen();
+    }
+    send(frame) {
+      this.hello = pb.Envelope.decode(frame.subarray(4));
+    }
+    answer(kind) {
+      const payload = pb.Envelope.encode({ ...kind, id: this.hello.id }).finish();
+      this.onmessage({ data: Uint8Array.of(0, 0, payload.length >> 8, payload.length, ...payload).buffer });
+    }
+    close() {
+      this.readyState = Socket.CLOSING;
+    }
+  }
+  Object.assign(Socket, { CONNECTING: 0, OPEN: 1, CLOSING: 2 });
+  const kept = { token: "" };
+  Object.assign(globalThis, { WebSocket: Socket, location: { protocol: "http:", host: "here" }, sessionStorage: { getItem: (name) => kept[name] } });
+  const told = [];
+  const wire = new Wire({ welcome: ({ subject }) => told.push(subject), tokenWanted: (sentence) => told.push(sentence), lost: (sentence) => told.push(sentence) });
+
+  wire.connect();
+  const before = sockets[0].open();
+  sockets[0].answer({ refusal: { code: pb.RefusalCode.REFUSAL_UNAUTHENTICATED, message: "a token is wanted" } });
+  await before;
+  kept.token = "secret";
+  wire.connect();
+  const next = sockets[1].open();
+  sockets[0].answer({ welcome: { subject: "nobody", role: pb.Role.ROLE_VIEWER } });
+  sockets[0].onclose({ code: 1000 });
+  sockets[1].answer({ welcome: { subject: "anna", role: pb.Role.ROLE_OPERATOR } });
+  await next;
+  assert.deepEqual(told, ["a token is wanted", "anna"]);
+  assert.equal(sockets[0].readyState, Socket.CLOSING);
+  assert.equal(sockets[1].hello.hello.token, "secret");
 });
 
 /** A bench on a slow way: it has gone on by so many ticks when a request arrives, and stands at the last tick that is given. */

@@ -74,7 +74,7 @@ interface Waiting {
 
 const kRetryMs = 1000;
 
-/** One session after the other: a lost one is replaced until one answers. */
+/** One session after the other: a lost one is replaced until one answers. What comes late from a session that is replaced counts no more. */
 export class Wire {
   private socket: WebSocket | null = null;
   private waiting = new Map<number, Waiting>();
@@ -89,6 +89,10 @@ export class Wire {
   connect(conducts = false): void {
     const socket = new WebSocket(`${location.protocol.replace("http", "ws")}//${location.host}/bench`);
     socket.binaryType = "arraybuffer";
+    const waiting = new Map<number, Waiting>();
+    this.socket?.close();
+    this.socket = socket;
+    this.waiting = waiting;
     this.rest = new Uint8Array(0);
     let isToken = false;
     let refusal = "";
@@ -108,17 +112,21 @@ export class Wire {
         this.listener.tokenWanted(refusal);
       }
     };
-    socket.onmessage = ({ data }) => typeof data === "string" ? this.hear(data) : this.take(new Uint8Array(data as ArrayBuffer));
+    socket.onmessage = ({ data }) => {
+      if (this.socket !== socket) return;
+      if (typeof data === "string") this.hear(data);
+      else this.take(new Uint8Array(data as ArrayBuffer));
+    };
     socket.onclose = (event) => {
-      for (const each of this.waiting.values()) each.reject(new Error("the connection to the bench is lost"));
-      this.waiting.clear();
-      if (this.socket === socket) this.socket = null;
+      for (const each of waiting.values()) each.reject(new Error("the connection to the bench is lost"));
+      waiting.clear();
+      if (this.socket !== socket) return;
+      this.socket = null;
       if (isToken || this.isOver) return;
       if (mayConduct) return this.connect(true);
       this.listener.lost(refusal || event.reason || `the gateway does not answer (${event.code})`);
       setTimeout(() => this.isOver || this.connect(), kRetryMs);
     };
-    this.socket = socket;
   }
 
   /** Ends the session; no other follows. */
