@@ -5,7 +5,6 @@
 
 #include "plant/math/bracket.hpp"
 #include "plant/math/exponential.hpp"
-#include "plant/math/noise.hpp"
 #include "plant/math/rounding.hpp"
 #include "plant/math/trig.hpp"
 
@@ -13,7 +12,7 @@ namespace drivebench {
 namespace {
 
 constexpr double kNoiseStepS = 1e-6;
-constexpr double kMostNoise = 8.58;  // gaussian_noise() is never beyond
+constexpr double kMostNoise = 8.58;  // NoiseChannel::gaussian() is never beyond
 
 constexpr std::size_t index_of(int k) noexcept {
   return static_cast<std::size_t>(k);
@@ -155,8 +154,8 @@ Comparators::Comparators(const ComparatorParameters& p, double period_s, std::ui
     : p_(p),
       period_s_(period_s),
       noise_steps_(std::max<std::int64_t>(1, floor_to_integer(period_s / kNoiseStepS + 0.5))),
-      seed_(seed),
-      noise_channel_(noise_channel) {}
+      noise_{NoiseChannel(seed, noise_channel), NoiseChannel(seed, noise_channel + 1),
+             NoiseChannel(seed, noise_channel + 2)} {}
 
 double Comparators::offset_v(int terminal) const noexcept {
   return terminal == 0 ? p_.offset_a_v : (terminal == 1 ? p_.offset_b_v : p_.offset_c_v);
@@ -219,7 +218,7 @@ void Comparators::switch_within(ComparatorMemory& m, const Place& place, const I
                                 const Span& given, double duration_s) const noexcept {
   const double added_v = offset_v(place.terminal);
   if (p_.noise_rms_v == 0.0) return switch_within(m, place, input, added_v, 0.0, duration_s);
-  const auto channel = noise_channel_ + static_cast<std::uint64_t>(place.terminal);
+  const NoiseChannel noise = noise_[index_of(place.terminal)];
   const double step_s = period_s_ / static_cast<double>(noise_steps_);
   std::int64_t step = floor_to_integer(place.start_s / step_s + 1e-9);
   double largest = -1.0;  // draw of noise that reaches the threshold from where the input has come to
@@ -233,8 +232,8 @@ void Comparators::switch_within(ComparatorMemory& m, const Place& place, const I
       largest = sigmas > 0.0 ? (1.0 + 1e-9) * exponential(-0.5 * sigmas * sigmas) : 1.0;
     }
     const auto number = static_cast<std::uint64_t>(place.tick * noise_steps_ + step);
-    if (gaussian_draw(seed_, channel, number) <= largest) {
-      const double noise_v = p_.noise_rms_v * gaussian_noise(seed_, channel, number);
+    if (noise.draw(number) <= largest) {
+      const double noise_v = p_.noise_rms_v * noise.gaussian(number);
       switch_within(m, place, input, added_v + noise_v, from_s, to_s);
       largest = -1.0;
     }

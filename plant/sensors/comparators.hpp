@@ -5,6 +5,7 @@
 #include <cstdint>
 
 #include "plant/math/frames.hpp"
+#include "plant/math/noise.hpp"
 #include "plant/sensors/event_log.hpp"
 #include "plant/tick.hpp"
 #include "protocols/signals/sample.hpp"
@@ -101,8 +102,7 @@ class Comparators {
   ComparatorParameters p_;
   double period_s_;
   std::int64_t noise_steps_;  ///< in a tick
-  std::uint64_t seed_;
-  std::uint64_t noise_channel_;
+  std::array<NoiseChannel, 3> noise_;
 };
 
 }  // namespace drivebench

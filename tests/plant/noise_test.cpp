@@ -109,10 +109,10 @@ TEST(Noise, EveryArgumentBitFlipsHalfOfTheWord) {
     const std::uint64_t flip = std::uint64_t{1} << bit;
     std::array<double, 3> flipped{};
     for (std::uint64_t tick = 0; tick < 256; ++tick) {
-      const std::uint64_t word = noise_detail::hashed(1, 2, tick);
-      flipped[0] += std::popcount(word ^ noise_detail::hashed(1 ^ flip, 2, tick));
-      flipped[1] += std::popcount(word ^ noise_detail::hashed(1, 2 ^ flip, tick));
-      flipped[2] += std::popcount(word ^ noise_detail::hashed(1, 2, tick ^ flip));
+      const std::uint64_t word = NoiseChannel(1, 2).word(tick);
+      flipped[0] += std::popcount(word ^ NoiseChannel(1 ^ flip, 2).word(tick));
+      flipped[1] += std::popcount(word ^ NoiseChannel(1, 2 ^ flip).word(tick));
+      flipped[2] += std::popcount(word ^ NoiseChannel(1, 2).word(tick ^ flip));
     }
     for (const double count : flipped)
       EXPECT_NEAR(count / 256.0, 32.0, 6.0 * 4.0 / 16.0) << "bit " << bit;

@@ -87,11 +87,13 @@ class Runs(GatewayTest):
 class Suites(Runs):
     def test_suites_run_one_after_the_other_and_their_reports_are_kept(self):
         """Catches: a verdict of another suite, cases that are not counted, a report that lies where none is found, work that is left
-        behind, a run that waits for ever."""
+        behind, a run that waits for ever, another gateway that a page cannot tell from the one before."""
         self.suite("mixed", bad=FAILS, good=SERVO, skipped=SERVO.replace("[dut]", 'skip = "not today"\n[dut]'))
         self.suite("broken", broken="bench = 7\n")
         gateway = self.begin()
-        self.assertEqual(json.loads(gateway.get("/runs")[2]), {"suites": ["broken", "mixed", "servo"], "identifies": True, "runs": []})
+        listing = json.loads(gateway.get("/runs")[2])
+        begun_us = listing.pop("begun_us")
+        self.assertEqual(listing, {"suites": ["broken", "mixed", "servo"], "identifies": True, "runs": []})
         with gateway.browser() as browser:
             numbers = [self.started(browser, op="run_suite", suite=name) for name in ("servo", "mixed", "broken")]
         servo, mixed, broken = (self.ended(gateway, number) for number in numbers)
@@ -105,6 +107,8 @@ class Suites(Runs):
         self.assertEqual(self.left(), sorted([servo["report"], mixed["report"]]))
         self.assertEqual({each["name"] for each in json.loads(gateway.get("/reports")[2])}, set(self.left()))
         self.assertIn("good", gateway.get(f"/reports/{servo['report']}")[2])
+        self.assertEqual(json.loads(gateway.get("/runs")[2])["begun_us"], begun_us)
+        self.assertGreater(json.loads(self.begin().get("/runs")[2])["begun_us"], begun_us)
 
     def test_web_09_no_order_leads_beyond_what_the_gateway_offers(self):
         """Catches: a name that climbs, a link that is followed, an option or a shell in a name, a text that is taken for another, a

@@ -69,6 +69,19 @@ TEST(FoxgloveSession, AMessageHasSubscriptionTimeAndSample) {
   EXPECT_EQ(messages[2].bytes[1], 1);
 }
 
+// Catches: a clock that stands still after a reset or a restored state, until the bench has passed its old
+// time.
+TEST(FoxgloveSession, TheClockIsSetBackWithTheBench) {
+  FoxgloveSession session(welcome_with_axes(1));
+  session.text(R"({"op":"subscribe","subscriptions":[{"id":0,"channelId":1}]})");
+  session.from_bench(samples_of(0, 8'000'000, 2, 0));
+  taken(session);
+  session.from_bench(samples_of(0, 1, 1, 0));
+  const auto messages = taken(session);
+  ASSERT_EQ(count_of(messages, 2), 1u);
+  EXPECT_EQ(messages.back().bytes, "\x02" + messages.front().bytes.substr(5, 8));
+}
+
 // Catches: samples that a slow client loses without being told, or that are counted twice or for the other
 // axis.
 TEST(FoxgloveSession, WEB_06_ASlowClientIsToldHowManySamplesItLost) {

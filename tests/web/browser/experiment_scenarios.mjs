@@ -84,7 +84,7 @@ export function experimentScenarios({ axeFinds, catchFiles, enter, isShown, pict
       const empty = JSON.parse(await until(async () => JSON.stringify(await measured(page, "speed_rad_s") ?? {}), /"maximum":"0/));
       await page.keyboard.press("ArrowRight");
       const next = await position(page, /^0\.0001 s/);
-      await set(page, "speed of the player", "0.1");
+      await set(page, "speed of the player", "0.01");
       await page.focus("#player .panes");
       await page.keyboard.press("Space");
       const playing = await position(page, /^0\.[012]\d{3} s/);

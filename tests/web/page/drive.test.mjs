@@ -92,6 +92,60 @@ test("a session that was turned away ends after the next has begun", async () =>
   assert.equal(sockets[1].hello.hello.token, "secret");
 });
 
+/** Leases of two axes with one amplifier; what they ask, and a change that ends when it is told to. */
+function leasesOfTwo(t) {
+  t.mock.timers.enable({ apis: ["setInterval"] });
+  globalThis.window = globalThis;
+  const { ACTION_ACQUIRE, ACTION_RENEW } = pb.LeaseRequest.Action;
+  const asked = [];
+  const ask = async ({ lease }) => {
+    asked.push(lease.action === ACTION_ACQUIRE ? "acquire" : lease.action === ACTION_RENEW ? "renew" : "release");
+    return { done: { owner: 7 } };
+  };
+  const leases = new Leases({ description: { axes: [{ name: "a" }, { name: "b", shares_amplifier_with: "a" }], lease_s: 3 }, wire: { ask } });
+  const change = (axis) => {
+    let end;
+    const done = leases.under(axis, () => new Promise((resolve) => { end = resolve; }));
+    return { done, end: () => end() };
+  };
+  return { asked, leases, change };
+}
+
+const turn = () => new Promise((done) => setImmediate(done));
+
+// Catches: a borrowed lease that runs out before what it was borrowed for has ended; one that the first of two changes, of axes with
+// one amplifier, gives back under the second.
+test("a lease is borrowed until the last change has ended", async (t) => {
+  const { asked, leases, change } = leasesOfTwo(t);
+  const [first, second] = [change(0), change(1)];
+  await turn();
+  t.mock.timers.tick(1000);
+  first.end();
+  await first.done;
+  t.mock.timers.tick(1000);
+  await assert.rejects(leases.confirm(0).then(() => leases.acquire(0)).then(() => leases.release(0)), /a change of the axis is under way/);
+  leases.lost(0, "taken");
+  second.end();
+  await second.done;
+  t.mock.timers.tick(1000);
+  assert.deepEqual(asked, ["acquire", "acquire", "renew", "renew", "renew", "acquire", "release"]);
+  leases.end();
+});
+
+// Catches: a lease that the page takes to keep while a change has borrowed it, and that goes back with the change.
+test("a lease that is taken beside a change stays", async (t) => {
+  const { asked, leases, change } = leasesOfTwo(t);
+  const borrowed = change(0);
+  await turn();
+  const taken = leases.acquire(0);
+  borrowed.end();
+  await Promise.all([borrowed.done, taken]);
+  assert.deepEqual([asked, leases.holds(1)], [["acquire", "acquire"], true]);
+  await leases.release(1);
+  assert.deepEqual([asked.at(-1), leases.holds(0)], ["release", false]);
+  leases.end();
+});
+
 /** A bench on a slow way: it has gone on by so many ticks when a request arrives, and stands at the last tick that is given. */
 function slowBench(ticksOnTheWay, standsAt = Infinity) {
   const bench = { tick: 100, asked: [] };
@@ -107,7 +161,7 @@ function slowBench(ticksOnTheWay, standsAt = Infinity) {
   return bench;
 }
 
-const lent = { holds: () => false, under: (axis, act) => act() };
+const lent = { holds: () => false, under: (axis, act) => act(), confirm: async () => undefined };
 const forTicks = (ticks) => (start) => [start, start + ticks].map((at_tick, i) => ({ inject_fault: { value: 1 - i, at_tick } }));
 
 // Catches: a fault whose begin and end the bench has passed before it hears of them, so that it lasts no tick and is told as done;
@@ -131,6 +185,8 @@ test("the lease of a moment lasts until the fault has ended", async () => {
   await assert.rejects(new Changes(slowBench(0, 300), lent, 1e-3).make(0, forTicks(3), true), /stands at tick 300: what was to act at tick 614/);
   const standing = slowBench(0, 110);
   assert.deepEqual(await new Changes(standing, lent, 1e-3).make(0, () => [{ set_load: {} }], true), [110]);
+  const ranOut = { ...lent, confirm: () => Promise.reject(new Error("the lease is not yours")) };
+  await assert.rejects(new Changes(slowBench(1), ranOut, 1e-3).make(0, forTicks(3), true), /not yours/);
 });
 
 // Catches: a run that ended early and is called done, a part of a run that is rounded up to the whole.

@@ -16,14 +16,16 @@ test("the envelope keeps a spike of one tick", () => {
   assert.ok(points.every((each, i) => each === 0 || i === 154 || i === 155));
 });
 
-// Catches: a line that is drawn across samples that were lost, and one that breaks where the pixels are finer than the ticks.
+// Catches: a line that is drawn across samples that were lost, or never sent because a new subscription begins, and one that breaks where the pixels are finer than the ticks.
 test("a gap breaks the line, and columns without samples do not", () => {
-  const history = historyOf(range(0, 10), () => 1);
-  history.push({ tick: 20, x: 2 }, true);
-  const points = envelope(history.rows(0, 20), "x", 0, 21, 42);
-  assert.equal(points[2], undefined);
-  assert.equal(points.filter((each) => each === null).length, 2);
-  assert.equal(points.indexOf(null) >> 1, 39);
+  for (const isTold of [true, false]) {
+    const history = historyOf(range(0, 10), () => 1);
+    history.push({ tick: 20, x: 2 }, isTold);
+    const points = envelope(history.rows(0, 20), "x", 0, 21, 42);
+    assert.equal(points[2], undefined);
+    assert.equal(points.filter((each) => each === null).length, 2);
+    assert.equal(points.indexOf(null) >> 1, 39);
+  }
 });
 
 // Catches: a ring that mixes old and new samples where it begins again, and a run that goes on in the window of the last.
@@ -157,6 +159,19 @@ test("the trigger asks the server and fetches what it has kept", async () => {
   assert.deepEqual([trigger.isArmed, trigger.problem, changes], [false, "the sessions have 32 triggers", 6]);
   trigger.end();
   assert.equal(server.asked.filter((each) => each.trigger).length, 4, "nothing to end");
+});
+
+// Catches: a capture that is thrown away because the next event comes in one message with its last piece, or that ends this event.
+test("the next event with the last piece of a capture", async () => {
+  const server = fakeServer(() => new Uint8Array(Float64Array.of(4, 40).buffer));
+  const trigger = new Trigger(server, () => {});
+  trigger.settings = { ...trigger.settings, condition: "above", signal: "x" };
+  trigger.arm([], 100);
+  server.open[0].answer();
+  trigger.take({ capture: 1, tick: 5, complete: true, rows: 1 });
+  trigger.take({ capture: 2, tick: 6, complete: false });
+  await settled();
+  assert.deepEqual([trigger.captured?.tick, trigger.firedTick, trigger.isArmed], [5, 6, true]);
 });
 
 // Catches: the refusal of an older setting that comes in one message with the answer to the newest, and is shown as the newest's; an

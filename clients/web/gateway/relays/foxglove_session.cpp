@@ -226,6 +226,8 @@ void FoxgloveSession::send(const v1::Samples& samples) {
   channel.lost += samples.dropped();
   std::uint64_t time_ns = 0;
   for (const v1::Sample& sample : samples.samples()) {
+    if (sample.tick() <= channel.last_tick) time_ns_ = 0;  // the bench was set back, and its clock with it
+    channel.last_tick = sample.tick();
     if (waiting_bytes_ >= kSamplesLimit) {
       ++channel.lost;
       continue;

@@ -29,6 +29,7 @@ struct FoxgloveChannel {
   bool is_subscribed = false;
   std::uint32_t subscription = 0;  ///< the client's number
   std::uint64_t lost = 0;          ///< samples that no status has told yet
+  std::uint64_t last_tick = 0;     ///< of the newest sample
 };
 
 /// A client of Foxglove, without its socket: what it says becomes subscriptions of the bench, what the bench

@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <deque>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <optional>
@@ -21,7 +22,8 @@ using asio::use_awaitable;
 using boost::system::error_code;
 using namespace std::chrono_literals;
 
-constexpr auto kBetweenMessages = 4ms;  // to a browser: many small frames become one message
+constexpr auto kBetweenMessages = 4ms;    // to a browser: many small frames become one message
+constexpr std::size_t kMostAnswers = 16;  // to orders for the runs, that wait for the browser
 
 Drive::Time now() {
   return std::chrono::steady_clock::now();
@@ -84,7 +86,9 @@ class PageRelay : public Relay, public std::enable_shared_from_this<PageRelay> {
       const Order order = drive_->read({reinterpret_cast<const char*>(message.data()), message.size()});
       if (order.is_for_runs()) {
         const auto ask = [&]() -> asio::awaitable<std::string> { co_return answer_of_runs(order); };
-        told_of_runs_ = co_await asio::co_spawn(context_.connecting, ask, use_awaitable);
+        told_of_runs_.push_back(co_await asio::co_spawn(context_.connecting, ask, use_awaitable));
+        if (told_of_runs_.size() > kMostAnswers)
+          leave(websocket::close_code::going_away, "the browser reads too slowly");
         pause_.cancel();
         co_return std::string_view();
       }
@@ -204,7 +208,7 @@ class PageRelay : public Relay, public std::enable_shared_from_this<PageRelay> {
     for (error_code error; !error && !leaving_;) {
       queue_.take(message);
       const std::string report = drive_ ? drive_->report(now()) : std::string();
-      const std::string of_runs = std::exchange(told_of_runs_, {});
+      const std::string of_runs = next_answer_of_runs();
       if (!message.empty()) {
         co_await client_.async_write(asio::buffer(message), asio::redirect_error(use_awaitable, error));
       }
@@ -221,6 +225,14 @@ class PageRelay : public Relay, public std::enable_shared_from_this<PageRelay> {
     leave(websocket::close_code::normal, "");
     for (bool goes_on = true; goes_on;)
       goes_on = co_await wait();
+  }
+
+  /// Empty: none waits.
+  std::string next_answer_of_runs() {
+    if (told_of_runs_.empty()) return {};
+    std::string answer = std::move(told_of_runs_.front());
+    told_of_runs_.pop_front();
+    return answer;
   }
 
   asio::awaitable<void> write_text(const std::string& text, error_code& error) {
@@ -258,8 +270,8 @@ class PageRelay : public Relay, public std::enable_shared_from_this<PageRelay> {
   asio::steady_timer turn_;       // of the drive
   asio::steady_timer turnstile_;  // of what is written to the bench
   bool is_writing_ = false;
-  bool may_run_ = false;        // by its role with the bench
-  std::string told_of_runs_{};  // the newest that the browser has not got
+  bool may_run_ = false;                    // by its role with the bench
+  std::deque<std::string> told_of_runs_{};  // what the browser has not got
   std::optional<Leaving> leaving_{};
 };
 

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <array>
+#include <chrono>
 #include <exception>
 #include <nlohmann/json.hpp>
 #include <utility>
@@ -35,7 +36,11 @@ std::filesystem::path folder_of_results(const std::filesystem::path& reports) {
 }  // namespace
 
 Runs::Runs(RunPlaces places, const std::filesystem::path& suites, bool identifies)
-    : places_(std::move(places)), identifies_(identifies) {
+    : places_(std::move(places)),
+      identifies_(identifies),
+      begun_us_(std::chrono::duration_cast<std::chrono::microseconds>(
+                    std::chrono::system_clock::now().time_since_epoch())
+                    .count()) {
   places_.reports = folder_of_results(places_.reports);
   if (!suites.empty()) suites_.emplace(suites);
   worker_ = std::jthread([this](const std::stop_token& stop) { run_all(stop); });
@@ -93,7 +98,8 @@ RunAnswer Runs::cancel(std::uint64_t number) {
 }
 
 std::string Runs::list() const {
-  nlohmann::ordered_json all = {{"suites", suites_ ? suites_->names() : std::vector<std::string>()},
+  nlohmann::ordered_json all = {{"begun_us", begun_us_},
+                                {"suites", suites_ ? suites_->names() : std::vector<std::string>()},
                                 {"identifies", identifies_},
                                 {"runs", nlohmann::ordered_json::array()}};
   const std::lock_guard lock(mutex_);

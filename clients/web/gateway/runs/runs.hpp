@@ -77,6 +77,7 @@ class Runs {
   RunPlaces places_;
   std::optional<SuiteFolder> suites_{};
   bool identifies_;
+  std::int64_t begun_us_;       ///< Unix time: another gateway numbers its runs anew
   mutable std::mutex mutex_{};  // of what follows
   std::condition_variable_any changed_{};
   std::uint64_t last_number_ = 0;

@@ -9,7 +9,7 @@ const kAskAgainMs = 50;
 const kAheads_s = [0.5, 2, 8];
 
 export class Changes {
-  constructor(private readonly wire: Pick<Wire, "ask">, private readonly leases: Pick<Leases, "holds" | "under">, private readonly periodS: number) {}
+  constructor(private readonly wire: Pick<Wire, "ask">, private readonly leases: Pick<Leases, "holds" | "under" | "confirm">, private readonly periodS: number) {}
 
   /**
    * Sends the requests together and gives the ticks at which the bench acted. They may be scheduled: `start` is a tick that lies
@@ -20,7 +20,10 @@ export class Changes {
     const borrows = !this.leases.holds(axis);
     return this.leases.under(axis, async () => {
       const { ticks, last } = await this.inTime(requests);
-      if (borrows && last > 0) await this.reach(last);
+      if (borrows && last > 0) {
+        await this.reach(last);
+        await this.leases.confirm(axis);
+      }
       return ticks;
     });
   }

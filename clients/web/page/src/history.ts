@@ -26,7 +26,8 @@ export class History {
   push(sample: Record<string, number>, afterGap: boolean): void {
     const tick = sample.tick;
     if (tick <= this.lastTick) this.count = 0; // another run of the bench
-    if (afterGap && this.count > 0) this.put(tick - 0.5, null);
+    const isGap = afterGap || tick > this.lastTick + 1;
+    if (isGap && this.count > 0) this.put(tick - 0.5, null);
     this.put(tick, sample);
     this.lastTick = tick;
   }

@@ -9,6 +9,8 @@ export class Leases {
   private readonly owners: number[];
   /** The axis whose lease is that of an axis. */
   private readonly leased: number[];
+  /** How many actions of the page need the lease of an axis just now. */
+  private readonly users: number[];
   private readonly listeners: ((axis: number, sentence: string) => void)[] = [];
   private readonly timer: number;
   /** The gateway commands the axes of all leases. */
@@ -19,6 +21,7 @@ export class Leases {
   constructor(private readonly bench: Bench) {
     const axes = bench.description.axes;
     this.owners = axes.map(() => 0);
+    this.users = axes.map(() => 0);
     this.leased = axes.map((axis, number) => (axis.shares_amplifier_with ? axes.findIndex((each) => each.name === axis.shares_amplifier_with) : number));
     this.timer = window.setInterval(() => this.renew(), ((bench.description.lease_s as number) * 1000) / 3);
   }
@@ -47,32 +50,48 @@ export class Leases {
 
   async acquire(axis: number): Promise<void> {
     if (this.holds(axis)) return;
-    const { done } = await this.ask(axis, ACTION_ACQUIRE);
-    this.areGivenBack = false;
-    this.set(axis, done?.owner as number);
+    await this.use(axis, async ({ done }) => {
+      this.areGivenBack = false;
+      this.set(axis, done?.owner as number);
+    });
   }
 
   async release(axis: number): Promise<void> {
     if (!this.holds(axis)) return;
     if (this.areDriven) throw new Error("the gateway drives the axis: give it back under Drive");
+    if (this.users[this.leased[axis]] > 0) throw new Error("a change of the axis is under way, and what it has scheduled would end with the lease");
     await this.ask(axis, ACTION_RELEASE);
     this.set(axis, 0);
   }
 
   /** Acts under a lease, which the page borrows for so long if it holds none. */
   async under<T>(axis: number, act: () => Promise<T>): Promise<T> {
-    if (this.holds(axis)) return act();
-    await this.ask(axis, ACTION_ACQUIRE);
-    try {
-      return await act();
-    } finally {
-      await this.ask(axis, ACTION_RELEASE).catch(() => undefined); // it may have run out
-    }
+    return this.holds(axis) ? act() : this.use(axis, act);
+  }
+
+  /** Throws if the lease has run out meanwhile. */
+  async confirm(axis: number): Promise<void> {
+    await this.ask(axis, ACTION_RENEW);
   }
 
   /** The lease has gone, for the reason that the sentence gives. */
   lost(axis: number, sentence: string): void {
     this.set(axis, 0, sentence);
+  }
+
+  /** Acts with the lease. The last one that needs it gives it back, unless the page holds it. */
+  private async use<T>(axis: number, act: (answer: pb.Envelope) => Promise<T>): Promise<T> {
+    const leased = this.leased[axis];
+    ++this.users[leased]; // from here on: another one must not give back what this one is given
+    let isGiven = false;
+    try {
+      const answer = await this.ask(axis, ACTION_ACQUIRE);
+      isGiven = true;
+      return await act(answer);
+    } finally {
+      const isLast = --this.users[leased] === 0 && this.owners[leased] === 0;
+      if (isLast && isGiven) await this.ask(axis, ACTION_RELEASE).catch(() => undefined); // it may have run out
+    }
   }
 
   private ask(axis: number, action: pb.LeaseRequest.Action): Promise<pb.Envelope> {
@@ -89,7 +108,8 @@ export class Leases {
 
   /** A renewal that comes after a lease was given back is refused, which is no news. */
   private renew(): void {
-    for (const axis of this.held) {
+    for (const axis of this.users.keys()) {
+      if (this.owners[axis] === 0 && this.users[axis] === 0) continue;
       this.ask(axis, ACTION_RENEW).catch((problem: Error) => {
         if (this.holds(axis) && !this.areGivenBack) this.lost(axis, `lease: ${problem.message}`);
       });

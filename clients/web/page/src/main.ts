@@ -53,6 +53,7 @@ class Page {
 
   private welcome(welcome: pb.Welcome, conducts: boolean): void {
     this.scope?.end();
+    this.scope = null;
     this.endPanels();
     const bench = new Bench(this.wire, welcome, conducts);
     this.bench = bench;
@@ -85,8 +86,12 @@ class Page {
       const wanted = signals.join();
       if (this.subscribed[axis] === wanted) return;
       this.subscribed[axis] = wanted;
-      history.choose(signals);
-      this.wire.ask({ subscribe: { axis, decimation: 1, signals } }).catch((problem) => problem instanceof Refused && this.showAlert(problem.message));
+      // Samples that come before the answer have the signals of before.
+      const answered = () => {
+        history.choose(signals);
+        return false;
+      };
+      this.wire.ask({ subscribe: { axis, decimation: 1, signals } }, answered).catch((problem) => problem instanceof Refused && this.showAlert(problem.message));
     });
   }
 

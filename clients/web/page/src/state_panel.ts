@@ -100,7 +100,7 @@ export class StatePanel {
     if (this.of.isLockstep && status.axes.every((each) => each.sample?.owner === 0)) {
       notes.push("lockstep: time stands still until a controller drives the bench: `drivebench control` for example, or Drive below");
     }
-    if (this.notes.childElementCount !== notes.length) this.notes.replaceChildren(...notes.map((each) => element("li", {}, each)));
+    if (this.notes.textContent !== notes.join("")) this.notes.replaceChildren(...notes.map((each) => element("li", {}, each)));
   }
 }
 

@@ -106,7 +106,7 @@ export class Trigger {
 
   /** All pieces of a capture; the last one arms a trigger that is not single. */
   private async fetch(capture: number, tick: number, rows: number): Promise<void> {
-    const { channels } = this;
+    const { channels, setting } = this;
     const data = new Float64Array(rows * (1 + channels.length));
     const piece = async (first: number) => {
       const answer = await this.wire!.ask({ read_capture: { capture, first_row: first } });
@@ -120,8 +120,8 @@ export class Trigger {
     } catch {
       return; // another setting has taken its place, or the connection is lost
     }
-    if (channels !== this.channels || this.firedTick !== tick) return;
-    this.firedTick = null;
+    if (setting !== this.setting) return;
+    if (this.firedTick === tick) this.firedTick = null; // else the next event is there already
     this.isArmed = this.settings.sweep !== "single";
     this.captured = { tick, rows: capturedRows(data, channels) };
     this.changed();

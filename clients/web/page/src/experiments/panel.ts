@@ -15,7 +15,10 @@ import { kStateNames } from "./states";
 import { arrivalOf, factsOf, fileNameOf, titleOf } from "./words";
 
 const [kBusyMs, kIdleMs] = [500, 3000];
-const kKeys = new RequestKeys(); // outlives the panel, which each session makes anew
+// Both outlive the panel, which each session makes anew.
+const kKeys = new RequestKeys();
+/** Experiments of this page whose end it tells, and whose data it shows then unless its user looks at others. */
+const kAwaited = new Set<number>();
 
 export class ExperimentsPanel {
   private readonly answer = element("p", { class: "answer", role: "status" });
@@ -27,8 +30,6 @@ export class ExperimentsPanel {
   private timer = 0;
   /** Hidden where the bench keeps no experiments, or its user may not ask for one. */
   private readonly form = element("details", { hidden: true }, element("summary", {}, "New experiment"));
-  /** Experiments of this page whose end it tells, and whose data it shows then unless its user looks at others. */
-  private readonly awaited = new Set<number>();
 
   constructor(root: HTMLElement, private readonly bench: Bench, private readonly player: PlayerPlace, private readonly runs: RunsPanel) {
     this.list = new ExperimentList(bench, {
@@ -81,7 +82,9 @@ export class ExperimentsPanel {
       const all = (list?.experiments ?? []) as pb.ExperimentInfo[];
       this.list.show(all);
       this.form.hidden = !this.bench.mayChange;
-      for (const each of all) if (hasEnded(each.state) && this.awaited.delete(each.id as number)) this.over(each);
+      for (const each of all) if (hasEnded(each.state) && kAwaited.delete(each.id as number)) this.over(each);
+      const known = new Set(all.map((each) => each.id as number));
+      for (const each of kAwaited) if (!known.has(each)) kAwaited.delete(each); // the bench has begun anew
       return all.some((each) => !hasEnded(each.state));
     } catch (problem) {
       this.list.refused((problem as Error).message);
@@ -101,7 +104,7 @@ export class ExperimentsPanel {
     try {
       const { experiment_info: info } = await this.bench.wire.ask({ run_experiment: { ...wanted, request_key: kKeys.keyOf(wanted) } });
       kKeys.answered();
-      this.awaited.add(info?.id as number);
+      kAwaited.add(info?.id as number);
       this.tell(`experiment ${info?.id} is queued`);
       this.ask();
     } catch (problem) {

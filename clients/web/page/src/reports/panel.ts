@@ -15,6 +15,8 @@ export class ReportsPanel {
   private readonly answer = element("p", { class: "answer", role: "status" });
   private readonly rows = element("tbody");
   private readonly shown = element("div");
+  /** The number of the report that was asked for last: an older one that comes later is not shown. */
+  private asked = 0;
 
   constructor(private readonly root: HTMLElement) {
     root.replaceChildren(element("h2", {}, "Reports"), this.runs.root, element("div", { class: "bar" }, button("Look again", () => void this.list())), this.answer,
@@ -53,16 +55,18 @@ export class ReportsPanel {
   }
 
   private async show(name: string, plot: string | undefined): Promise<void> {
+    const asked = ++this.asked;
     this.shown.replaceChildren();
     try {
       const answer = await fetch(`/reports/${name}`);
       if (!answer.ok) throw new Error((await answer.text()).trim());
       const found = identificationIn((await answer.json()) as unknown);
       if (found === null) throw new Error("it is no report of `drivebench identify --json`");
+      if (asked !== this.asked) return;
       this.shown.replaceChildren(...this.identification(name, found, plot));
       setText(this.answer, "");
     } catch (problem) {
-      setText(this.answer, `${name}: ${(problem as Error).message}`);
+      if (asked === this.asked) setText(this.answer, `${name}: ${(problem as Error).message}`);
     }
   }
 

@@ -21,6 +21,8 @@ interface Run {
 }
 
 interface Listing {
+  /** When the gateway began: another one numbers its runs anew. */
+  begun_us: number;
   suites: string[];
   identifies: boolean;
   runs: Run[];
@@ -52,7 +54,7 @@ export class RunsPanel {
     element("table", { class: "list" }, element("thead", {}, element("tr", {}, ...kHeads.map((each) =>
       each === "" ? element("td") : element("th", { scope: "col" }, each)))), this.body));
   private readonly rows = new Map<number, Row>();
-  private listing: Listing = { suites: [], identifies: false, runs: [] };
+  private listing: Listing = { begun_us: 0, suites: [], identifies: false, runs: [] };
   private bench: Bench | null = null;
   private timer = 0;
   /** Of this page, until they end. */
@@ -68,6 +70,7 @@ export class RunsPanel {
   enter(bench: Bench | null): void {
     this.bench = bench;
     this.draw();
+    if (bench !== null) this.ask(); // behind it may be another gateway
   }
 
   told({ said, is_refusal: isRefusal, run }: RunsAnswer): void {
@@ -106,6 +109,7 @@ export class RunsPanel {
     try {
       const listing = (await (await fetch("/runs")).json()) as Listing | null;
       if (listing === null) return null;
+      if (listing.begun_us !== this.listing.begun_us) this.forget();
       const wereBusy = new Set(this.listing.runs.filter((each) => !hasEnded(each)).map((each) => each.number));
       if (listing.suites.join() !== this.listing.suites.join()) this.offer(listing.suites);
       this.listing = listing;
@@ -119,6 +123,13 @@ export class RunsPanel {
     } catch {
       return kIdleMs; // a lost gateway is told elsewhere
     }
+  }
+
+  /** Another gateway answers. */
+  private forget(): void {
+    if (this.awaited.size > 0) this.tell(`run ${[...this.awaited].join(", ")}: the gateway has begun anew, and knows nothing of it`, true);
+    this.awaited.clear();
+    this.listing.runs = [];
   }
 
   private offer(names: string[]): void {
