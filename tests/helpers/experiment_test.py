@@ -22,7 +22,7 @@ def request(ticks=400, amplitude=40.0, signals=SIGNALS, owner=OWNER, **more):
 
 def endless(**more):
     """Paced by the clock: longer than any test."""
-    return request(ticks=400_000, mode=pb.MODE_REALTIME, **more)
+    return request(ticks=900_000, mode=pb.MODE_REALTIME, **more)
 
 
 class Fetched:

@@ -6,11 +6,12 @@ import unittest
 PATIENCE_S = 300.0
 
 
-def install(source, folder):
-    """Copies the package `source` to `folder` and installs what it needs there; skips the test if npm cannot: the registry is not ours."""
+def install(source, folder, *options):
+    """Copies the package `source` to `folder` and installs what it needs there, with options of `npm ci`; skips the test if npm cannot: the
+    registry is not ours."""
     shutil.copytree(source, folder, ignore=shutil.ignore_patterns("node_modules"))
     try:
-        done = subprocess.run(["npm", "ci", "--no-audit", "--no-fund", "--ignore-scripts"], cwd=folder, capture_output=True, text=True,
+        done = subprocess.run(["npm", "ci", "--no-audit", "--no-fund", "--ignore-scripts", *options], cwd=folder, capture_output=True, text=True,
                               timeout=PATIENCE_S, check=False)
     except subprocess.TimeoutExpired as slow:
         raise unittest.SkipTest(f"npm cannot install {source.name}: {slow}") from slow

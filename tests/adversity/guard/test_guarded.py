@@ -16,7 +16,7 @@ except ImportError:
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[2] / "helpers"))
 from wire_client import BENCHES, PATIENCE_S, SERVER, Closed, guarded  # noqa: E402
-from wire_test import WireTest  # noqa: E402
+from wire_test import PATIENT_TEXT, WireTest  # noqa: E402
 
 # The guard cannot be compiled with sanitizers; they do its work in part.
 GUARD = os.environ.get("DRIVEBENCH_GUARD")
@@ -53,7 +53,7 @@ class Guarded(WireTest):
 
     def test_a_server_whose_ticks_allocate_nothing_goes_on(self):
         """Catches: a guard that ends every program."""
-        server = self.server("--mode", "realtime")
+        server = self.server("--mode", "realtime", text=PATIENT_TEXT)
         owner = self.client(server)
         self.assertDone(owner.lease())
         self.drive(owner, 3.0)

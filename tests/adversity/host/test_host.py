@@ -181,7 +181,7 @@ class Threads(HostTest):
 
     def test_os_12_a_server_without_its_io_thread_gives_its_axes_up(self):
         """Catches: a motor that runs on while no client can stop it."""
-        misfortune = Misfortune(sleep_ms=2500)
+        misfortune = Misfortune(sleep_ms=6000)
         server = self.unlucky_server(misfortune, "--mode", "realtime", text=PATIENT_TEXT)
         owner = self.client(server)
         owner.lease()
@@ -215,7 +215,7 @@ class Threads(HostTest):
         """Catches: a signal that is lost because no thread waits for it yet, or that costs the end of the recording; one
         order that comes as two signals, from `timeout` or a shell, and kills."""
         file = self.folder() / "run.mcap"
-        server = self.unlucky_server(Misfortune(sleep_ms=1500), "--mode", "realtime", "--record", str(file))
+        server = self.unlucky_server(Misfortune(sleep_ms=6000), "--mode", "realtime", "--record", str(file))
         self.client(server).status()
         signal_thread(server.process.pid, server.process.pid, signal.SIGUSR2)
         until(lambda: "the I/O thread stands still" in server.errors(), "it stands still")

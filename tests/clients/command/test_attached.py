@@ -95,7 +95,7 @@ class Attached(RegressionTest):
             finally:
                 process.kill()
 
-    def case(self, way, place, limit_s=30.0, watchdog=250, extra=""):
+    def case(self, way, place, limit_s=30.0, watchdog=2000, extra=""):
         return self.write("case.toml", CASE.format(way=way, place=place, limit_s=limit_s, watchdog=watchdog, extra=extra))
 
     def rerun(self, bundle):
@@ -130,7 +130,7 @@ class Attached(RegressionTest):
         port = free_ports(1)[0]
         with self.drive(f"tcp:127.0.0.1:{port}"):
             self.case("tcp", f"port = {port}", extra="").write_text(
-                CASE.format(way="tcp", place=f"port = {port}", limit_s=30, watchdog=250, extra="") +
+                CASE.format(way="tcp", place=f"port = {port}", limit_s=30, watchdog=2000, extra="") +
                 "[matrix]\nseed = [1, 2]\n", encoding="utf-8")
             cases = self.suite("--retries", 20, "--jobs", 2)["cases"]
         self.assertEqual([case["verdict"] for case in cases], ["pass", "pass"])
@@ -142,11 +142,11 @@ class Attached(RegressionTest):
         case = self.suite(code=FAILED)["cases"][0]
         self.assertEqual((case["verdict"], case["reason"]),
                          ("error", "never armed within 0.5 s: no device under test took the lease of the axis"))
-        for behaviour, why in (("leaves", r"^the device under test left the bench at 0\.\d+ s of 0\.3 s$"),
-                               ("falls silent", r"^the device under test fell silent at 0\.\d+ s of 0\.3 s$"),
-                               ("sends nothing", r"^never armed within 3 s: the device under test took the lease, but")):
+        for behaviour, watchdog, why in (("leaves", 2000, r"^the device under test left the bench at 0\.\d+ s of 0\.3 s$"),
+                                         ("falls silent", 60, r"^the device under test fell silent at 0\.\d+ s of 0\.3 s$"),
+                                         ("sends nothing", 2000, r"^never armed within 3 s: the device under test took the lease, but")):
             with self.subTest(behaviour), self.drive(f"tcp:127.0.0.1:{port}", behaviour):
-                self.case("tcp", f"port = {port}", limit_s=3.0, watchdog=60)
+                self.case("tcp", f"port = {port}", limit_s=3.0, watchdog=watchdog)
                 case = self.suite("--retries", 20, code=FAILED)["cases"][0]
                 self.assertEqual(case["verdict"], "error")
                 self.assertRegex(case["reason"], why)

@@ -58,7 +58,8 @@ with drivebench.Bench(os.environ["DRIVEBENCH_LINK"]) as bench:
         time.sleep(0.025)
 """
         case = PROGRAM.format(limit_s=60).replace("duration_s = 0.02", 'mode = "realtime"') + (
-            "[override.bench]\nperiod_us = 10000.0\ncommand_delay_ticks = 1\nwatchdog_ticks = 1000\narming_commands = 1\nsubsteps = 64\n")
+            "[override.bench]\nperiod_us = 10000.0\ncommand_delay_ticks = 1\nwatchdog_ticks = 1000\narming_commands = 1\nsubsteps = 64\n"
+            "[override.realtime]\nmax_lateness_ms = 60000\n")
         self.program(case, lazy)
         file = self.folder / "timing.json"
         done = subprocess.run([COMMAND, "test", self.folder / "suite", "--timing", file], capture_output=True, text=True,

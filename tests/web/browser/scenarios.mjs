@@ -294,7 +294,8 @@ const scenarios = {
     await set(page, "unit of the hold-off", "ticks");
     await set(page, "hold-off after a trigger", "0");
     await inject();
-    return { invalid, held, after: await page.evaluate(() => window.states) };
+    const after = JSON.parse(await until(() => page.evaluate(() => JSON.stringify(window.states)), /(triggered.*){2}/));
+    return { invalid, held, after };
   },
 
   /** An axis that the page drives trips. */

@@ -258,7 +258,7 @@ class Plain(TlsTest):
         owner, reader, half = (self.tls_client(server, self.context(), **options) for options in ({}, {"receive_buffer": 4096}, {}))
         owner.lease()
         reader.ask(subscribe=pb.Subscribe(decimation=1))
-        for tick in range(3000):  # more than the buffers hold
+        for tick in range(2000):  # more than the buffers hold
             owner.step(tick, 1.0)
         silent = self.tls_client(server, self.context(), hello=False)
         shaking = self.context().wrap_socket(server.raw(), server_hostname="127.0.0.1", do_handshake_on_connect=False)
@@ -271,7 +271,7 @@ class Plain(TlsTest):
         select.select([shaking], [], [], PATIENCE_S)
         whole = frame(pb.Envelope(id=7, status_request=pb.StatusRequest()).SerializeToString())
         half.send_bytes(whole[:5])
-        owner.step(3000, 1.0)
+        owner.step(2000, 1.0)
         server.process.send_signal(signal.SIGSTOP)
         half.send_bytes(whole[5:])
         hello = silent.send(hello=pb.Hello(protocol_min=1, protocol_max=1))
@@ -286,8 +286,8 @@ class Plain(TlsTest):
             each.settimeout(PATIENCE_S)
         self.assertEqual(half.answer_to(7).WhichOneof("kind"), "status")
         self.assertEqual(silent.answer_to(hello).WhichOneof("kind"), "welcome")
-        self.assertEqual(Client(shaking).newest().tick, 3001)
-        self.assertEqual(reader.newest().tick, 3001)
+        self.assertEqual(Client(shaking).newest().tick, 2001)
+        self.assertEqual(reader.newest().tick, 2001)
         counts = owner.tcp_counts()
         self.assertEqual((counts["cut"], counts["tls_refused"], counts["sessions"]), (0, 0, 5))
 

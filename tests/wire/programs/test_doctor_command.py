@@ -122,9 +122,14 @@ class Doctor(CommandTest):
         self.assertEqual(sum(each["health"] == "problem" for each in every), found["problems"])
         self.assertEqual(code, FAILED if found["problems"] else OK)
         self.assertIn("of 200 wake-ups", next(each for each in every if each["name"] == "wake-up")["why"])
-        found, code = self.doctor_here("--measure-s", 0)
+        for _ in range(20):  # a machine that changes between two looks
+            found, code = self.doctor_here("--measure-s", 0)
+            told = self.run_program(DRIVEBENCH, "doctor", "--measure-s", 0)
+            if self.doctor_here("--measure-s", 0) == (found, code):
+                break
         self.assertNotIn("wake-up", {each["name"] for each in found["realtime"]})
-        text = self.drivebench("doctor", "--measure-s", 0, code=code).stdout
+        self.assertEqual(told.returncode, code, told.stderr)
+        text = told.stdout
         for each in found["realtime"] + found["can"]:
             self.assertRegex(text, rf"(?m)^  {each['health']} +{each['name']} ")
             words = " ".join(text.split())

@@ -340,7 +340,7 @@ class Realtime(WireTest):
 
     def test_cmd_02_silence_is_a_latched_timeout(self):
         """Catches: a plant that goes on with the last command of a controller that hangs."""
-        server = self.server("--mode", "realtime", text=SERVO_TEXT.replace("watchdog_ticks = 20", "watchdog_ticks = 4000"))
+        server = self.server("--mode", "realtime", text=PATIENT_TEXT.replace("watchdog_ticks = 400000", "watchdog_ticks = 4000"))
         owner = self.owner_at_work(server)
         until(lambda: owner.newest().state == 3, "timeout")
         sample = owner.newest()
@@ -366,7 +366,7 @@ class Realtime(WireTest):
 
     def test_own_03_the_lease_of_a_silent_owner_ends(self):
         """Catches: an axis that is lost to a client which keeps its socket open and sends nothing."""
-        server = self.server("--mode", "realtime")
+        server = self.server("--mode", "realtime", text=SERVO_TEXT.replace("watchdog_ticks = 20", "watchdog_ticks = 4000"))
         heir = self.client(server)
         owner = self.owner_at_work(server)
         self.assertRefused(heir.lease(), pb.REFUSAL_OWNED)

@@ -112,7 +112,7 @@ class Subscriptions(WireTest):
         ticks = 0
         # The test reads nothing for as long as it takes to fill both socket buffers and the ring of 256 samples; the
         # server cuts after two seconds without progress, these exchanges take a fraction of that.
-        for ticks in range(1, 4001):
+        for ticks in range(1, 2501):
             owner.step(ticks - 1, 1.0)
         slow.send(status_request=pb.StatusRequest())
         seen, dropped, newest = 0, 0, 0
@@ -134,7 +134,7 @@ class Subscriptions(WireTest):
         owner, slow = self.client(server), self.client(server, unix=True)
         owner.lease()
         slow.ask(subscribe=pb.Subscribe(decimation=1))
-        ticks = 2000  # more than kernel and ring hold; a unix socket that is not read stops taking data
+        ticks = 1000  # more than kernel and ring hold; a unix socket that is not read stops taking data
         for tick in range(ticks):
             owner.step(tick, 1.0)
         seen, gaps = [], []
@@ -185,7 +185,7 @@ class Subscriptions(WireTest):
             viewer = self.client(server, receive_buffer=4096)
             viewer.ask(subscribe=pb.Subscribe(decimation=1))
             since = time.monotonic()
-            for tick in range(tick, tick + 3000):
+            for tick in range(tick, tick + 2000):
                 owner.step(tick, 1.0)
             tick += 1
             time.sleep(1.0)

@@ -158,7 +158,7 @@ class Captures(TriggerTest):
         viewer, other = self.client(server), self.client(server, conducts=True)
         self.arm(viewer, pb.Trigger(condition=pb.TRIGGER_BITS_APPEAR, signal="injected", bits=(1 << 64) - 1, ticks_before=50,
                                     ticks_after=50, captured=[kept("injected")]))
-        begins = other.newest().tick + 4000
+        begins = other.newest().tick + 16_000
         for value, at_tick in ((1.0, begins), (0.0, begins + 1)):
             self.assertDone(other.ask(inject_fault=pb.InjectFault(name="open_phase", value=value, at_tick=at_tick)))
         end = time.monotonic() + PATIENCE_S
