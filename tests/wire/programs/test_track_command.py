@@ -101,8 +101,8 @@ class Track(WireTest):
         does not see, a command that does not end."""
         server = self.server(text=self.bench_text().partition("[[axis.set]]")[0])
         link = ("--link", f"tcp:{server.ready['tcp']}")
-        self.drivebench("set", "0", "machine.rotor_resistance_ohm", "12.9", "--ramp-s", 3, *link)
-        rows = self.rows(*link, "--duration", 1.6)
+        self.drivebench("set", "0", "machine.rotor_resistance_ohm", "12.9", "--ramp-s", 12, *link)
+        rows = self.rows(*link, "--duration", 3)
         estimates = [row for row in rows if "missing" not in row and row["T_R"]["estimate"]]
         self.assertGreater(len(estimates), 3, rows)
         self.assertLess(estimates[-1]["T_R"]["truth"], 0.95 * estimates[0]["T_R"]["truth"])
