@@ -70,6 +70,10 @@ class PageRelay : public Relay, public std::enable_shared_from_this<PageRelay> {
         leave(websocket::close_code::protocol_error, problem);
         co_return;
       }
+      if (told_of_runs_.size() > kMostAnswers) {
+        leave(websocket::close_code::going_away, "the browser reads too slowly");
+        co_return;
+      }
       error_code gone;
       if (!is_order) co_await write(buffer.data(), gone);
       if (gone) co_return;
@@ -87,8 +91,6 @@ class PageRelay : public Relay, public std::enable_shared_from_this<PageRelay> {
       if (order.is_for_runs()) {
         const auto ask = [&]() -> asio::awaitable<std::string> { co_return answer_of_runs(order); };
         told_of_runs_.push_back(co_await asio::co_spawn(context_.connecting, ask, use_awaitable));
-        if (told_of_runs_.size() > kMostAnswers)
-          leave(websocket::close_code::going_away, "the browser reads too slowly");
         pause_.cancel();
         co_return std::string_view();
       }
