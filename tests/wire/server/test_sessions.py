@@ -212,7 +212,7 @@ class Hello(WireTest):
         server, since = self.audited_server(), time.monotonic()
         client = self.client(server, hello=False)
         patient = self.client(server, hello=False)
-        time.sleep(1.0)  # half of the limit
+        time.sleep(0.5)  # a quarter of the limit
         self.assertEqual(patient.ask(hello=pb.Hello(protocol_min=1, protocol_max=1, client="slow")).WhichOneof("kind"), "welcome")
         self.assertTrue(client.is_closed())
         self.assertLimitOf2s(since)
