@@ -92,14 +92,20 @@ test("a session that was turned away ends after the next has begun", async () =>
   assert.equal(sockets[1].hello.hello.token, "secret");
 });
 
-/** Leases of two axes with one amplifier; what they ask, and a change that ends when it is told to. */
-function leasesOfTwo(t) {
+const turn = () => new Promise((done) => setImmediate(done));
+
+/** Leases of two axes with one amplifier; what they ask, of which the bench refuses one, and a change that ends when it is told to. */
+function leasesOfTwo(t, refused = -1) {
   t.mock.timers.enable({ apis: ["setInterval"] });
   globalThis.window = globalThis;
   const { ACTION_ACQUIRE, ACTION_RENEW } = pb.LeaseRequest.Action;
   const asked = [];
   const ask = async ({ lease }) => {
     asked.push(lease.action === ACTION_ACQUIRE ? "acquire" : lease.action === ACTION_RENEW ? "renew" : "release");
+    if (asked.length - 1 === refused) {
+      await turn();
+      throw new Error("the bench is busy");
+    }
     return { done: { owner: 7 } };
   };
   const leases = new Leases({ description: { axes: [{ name: "a" }, { name: "b", shares_amplifier_with: "a" }], lease_s: 3 }, wire: { ask } });
@@ -110,8 +116,6 @@ function leasesOfTwo(t) {
   };
   return { asked, leases, change };
 }
-
-const turn = () => new Promise((done) => setImmediate(done));
 
 // Catches: a borrowed lease that runs out before what it was borrowed for has ended; one that the first of two changes, of axes with
 // one amplifier, gives back under the second.
@@ -129,6 +133,18 @@ test("a lease is borrowed until the last change has ended", async (t) => {
   await second.done;
   t.mock.timers.tick(1000);
   assert.deepEqual(asked, ["acquire", "acquire", "renew", "renew", "renew", "acquire", "release"]);
+  leases.end();
+});
+
+// Catches: a lease that stays because the change that ends last was refused it, after the one that had it.
+test("a borrowed lease goes back although the last change is refused", async (t) => {
+  const { asked, leases, change } = leasesOfTwo(t, 1);
+  const first = change(0);
+  await turn();
+  const refused = change(0);
+  first.end();
+  await Promise.all([first.done, assert.rejects(refused.done, /busy/)]);
+  assert.deepEqual(asked, ["acquire", "acquire", "release"]);
   leases.end();
 });
 
@@ -186,7 +202,7 @@ test("the lease of a moment lasts until the fault has ended", async () => {
   const standing = slowBench(0, 110);
   assert.deepEqual(await new Changes(standing, lent, 1e-3).make(0, () => [{ set_load: {} }], true), [110]);
   const ranOut = { ...lent, confirm: () => Promise.reject(new Error("the lease is not yours")) };
-  await assert.rejects(new Changes(slowBench(1), ranOut, 1e-3).make(0, forTicks(3), true), /not yours/);
+  await assert.rejects(new Changes(slowBench(1), ranOut, 1e-3).make(0, forTicks(3), true), /with it ended what was scheduled: the lease is not yours/);
 });
 
 // Catches: a run that ended early and is called done, a part of a run that is rounded up to the whole.

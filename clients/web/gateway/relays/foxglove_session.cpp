@@ -181,6 +181,7 @@ std::vector<v1::Subscribe> FoxgloveSession::text(std::string_view text) {
     } else {
       throw Refused(fmt::format("op: {} is not one of subscribe, unsubscribe", shown(op)));
     }
+    if (std::ranges::none_of(channels_, &FoxgloveChannel::is_subscribed)) time_ns_ = 0;  // nobody watched it
     std::vector<v1::Subscribe> changes = changes_between(channels_, channels);
     channels_ = std::move(channels);
     return changes;

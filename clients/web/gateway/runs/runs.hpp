@@ -48,9 +48,10 @@ class Runs {
   /// Throws RunRefusal if it has ended or never was.
   RunAnswer cancel(std::uint64_t number);
 
-  /// As JSON: {"suites": [NAME], "identifies": true, "runs": [{"number", "subject", "state", "done", "of",
-  /// "bad", "sentence", "report"}]}, the newest first. The states are `waits`, `runs`, `passed`, `failed` and
-  /// `cancelled`; `report` is a name in the folder of reports or empty.
+  /// As JSON: {"begun_us": N, "suites": [NAME], "identifies": true, "runs": [{"number", "subject", "state",
+  /// "done", "of", "bad", "sentence", "report"}]}, the newest first. Runs of another `begun_us` have other
+  /// numbers. The states are `waits`, `runs`, `passed`, `failed` and `cancelled`; `report` is a name in the
+  /// folder of reports or empty.
   std::string list() const;
 
  private:

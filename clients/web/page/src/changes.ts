@@ -22,7 +22,9 @@ export class Changes {
       const { ticks, last } = await this.inTime(requests);
       if (borrows && last > 0) {
         await this.reach(last);
-        await this.leases.confirm(axis);
+        await this.leases.confirm(axis).catch((problem: Error) => {
+          throw new Error(`the lease has run out, and with it ended what was scheduled: ${problem.message}`);
+        });
       }
       return ticks;
     });

@@ -11,6 +11,8 @@ export class Leases {
   private readonly leased: number[];
   /** How many actions of the page need the lease of an axis just now. */
   private readonly users: number[];
+  /** The bench has given the lease of an axis, and the page has not given it back. */
+  private readonly given: boolean[];
   private readonly listeners: ((axis: number, sentence: string) => void)[] = [];
   private readonly timer: number;
   /** The gateway commands the axes of all leases. */
@@ -22,6 +24,7 @@ export class Leases {
     const axes = bench.description.axes;
     this.owners = axes.map(() => 0);
     this.users = axes.map(() => 0);
+    this.given = axes.map(() => false);
     this.leased = axes.map((axis, number) => (axis.shares_amplifier_with ? axes.findIndex((each) => each.name === axis.shares_amplifier_with) : number));
     this.timer = window.setInterval(() => this.renew(), ((bench.description.lease_s as number) * 1000) / 3);
   }
@@ -61,6 +64,7 @@ export class Leases {
     if (this.areDriven) throw new Error("the gateway drives the axis: give it back under Drive");
     if (this.users[this.leased[axis]] > 0) throw new Error("a change of the axis is under way, and what it has scheduled would end with the lease");
     await this.ask(axis, ACTION_RELEASE);
+    this.given[this.leased[axis]] = false;
     this.set(axis, 0);
   }
 
@@ -83,14 +87,16 @@ export class Leases {
   private async use<T>(axis: number, act: (answer: pb.Envelope) => Promise<T>): Promise<T> {
     const leased = this.leased[axis];
     ++this.users[leased]; // from here on: another one must not give back what this one is given
-    let isGiven = false;
     try {
       const answer = await this.ask(axis, ACTION_ACQUIRE);
-      isGiven = true;
+      this.given[leased] = true;
       return await act(answer);
     } finally {
       const isLast = --this.users[leased] === 0 && this.owners[leased] === 0;
-      if (isLast && isGiven) await this.ask(axis, ACTION_RELEASE).catch(() => undefined); // it may have run out
+      if (isLast && this.given[leased]) {
+        this.given[leased] = false;
+        await this.ask(axis, ACTION_RELEASE).catch(() => undefined); // it may have run out
+      }
     }
   }
 

@@ -28,6 +28,9 @@ interface Listing {
   runs: Run[];
 }
 
+/** Of a gateway that runs nothing. */
+const kNothing: Listing = { begun_us: 0, suites: [], identifies: false, runs: [] };
+
 class Row {
   readonly root = element("tr");
   private readonly cells = kHeads.slice(1, -1).map(() => element("td"));
@@ -54,7 +57,7 @@ export class RunsPanel {
     element("table", { class: "list" }, element("thead", {}, element("tr", {}, ...kHeads.map((each) =>
       each === "" ? element("td") : element("th", { scope: "col" }, each)))), this.body));
   private readonly rows = new Map<number, Row>();
-  private listing: Listing = { begun_us: 0, suites: [], identifies: false, runs: [] };
+  private listing = kNothing;
   private bench: Bench | null = null;
   private timer = 0;
   /** Of this page, until they end. */
@@ -108,8 +111,8 @@ export class RunsPanel {
   private async read(): Promise<number | null> {
     try {
       const listing = (await (await fetch("/runs")).json()) as Listing | null;
+      if (listing?.begun_us !== this.listing.begun_us) this.forget();
       if (listing === null) return null;
-      if (listing.begun_us !== this.listing.begun_us) this.forget();
       const wereBusy = new Set(this.listing.runs.filter((each) => !hasEnded(each)).map((each) => each.number));
       if (listing.suites.join() !== this.listing.suites.join()) this.offer(listing.suites);
       this.listing = listing;
@@ -129,7 +132,8 @@ export class RunsPanel {
   private forget(): void {
     if (this.awaited.size > 0) this.tell(`run ${[...this.awaited].join(", ")}: the gateway has begun anew, and knows nothing of it`, true);
     this.awaited.clear();
-    this.listing.runs = [];
+    this.listing = kNothing;
+    this.draw();
   }
 
   private offer(names: string[]): void {
