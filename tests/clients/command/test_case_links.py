@@ -13,8 +13,8 @@ except ImportError as missing:
 
 LINKS = ("unix", "tcp", "shm", "can", "modbus")
 DOUBLES, FLOATS = LINKS[:3], LINKS[3:]
-# A bus says a command again that has had no answer for 20 ms of a busy machine. The bench refuses it, and the hash counts it: a
-# suite so often until none was said again.
+# On a busy machine a CAN link sends a command again after 20 ms without an answer. The bench refuses the second one, and the hash
+# counts refused commands. So the test runs the suite again until the link has sent no command twice.
 TRIES = 5
 # A case of each: bench, preset, length, and a bound that it keeps, and one that it breaks.
 FAMILIES = {

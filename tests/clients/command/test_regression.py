@@ -351,7 +351,7 @@ class Programs(RegressionTest):
         cases = {}
         for link in ("unix", "tcp", "shm", "can", "modbus"):
             self.write("case.toml", PROGRAM.format(limit_s=30).replace("[dut]", f'[dut]\nlink = "{link}"'))
-            for _ in range(5):  # a bus says a command again after 20 ms of a busy machine, and the hash counts that
+            for _ in range(5):  # a CAN link sends a command again after 20 ms, and the hash counts it
                 cases[link] = self.suite()["cases"][0]
                 if cases[link]["hash"] == cases["unix"]["hash"]:
                     break

@@ -116,7 +116,7 @@ load_profile = "load.csv"
         """Catches: a bundle that the next program refuses because its bench has a bus."""
         for link in ("can", "modbus"):
             case = PROGRAM.format(limit_s=30).replace("[dut]", f'[dut]\nlink = "{link}"').replace("i_a_a < 30", "i_a_a < 0")
-            for _ in range(5):  # a bus says a command again after 20 ms of a busy machine, and a sample counts that
+            for _ in range(5):  # a CAN link sends a command again after 20 ms, and the samples count it
                 bundle = self.failed_bundle(link, case, device_py=DRIVES.format(until=10 ** 9))
                 said = self.rerun(bundle, code=FAILED)
                 bundle.unlink()

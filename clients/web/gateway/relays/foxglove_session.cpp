@@ -181,7 +181,8 @@ std::vector<v1::Subscribe> FoxgloveSession::text(std::string_view text) {
     } else {
       throw Refused(fmt::format("op: {} is not one of subscribe, unsubscribe", shown(op)));
     }
-    if (std::ranges::none_of(channels_, &FoxgloveChannel::is_subscribed)) time_ns_ = 0;  // nobody watched it
+    // While the client has no subscription, the session does not see that the bench is set back.
+    if (std::ranges::none_of(channels_, &FoxgloveChannel::is_subscribed)) time_ns_ = 0;
     std::vector<v1::Subscribe> changes = changes_between(channels_, channels);
     channels_ = std::move(channels);
     return changes;
@@ -227,7 +228,7 @@ void FoxgloveSession::send(const v1::Samples& samples) {
   channel.lost += samples.dropped();
   std::uint64_t time_ns = 0;
   for (const v1::Sample& sample : samples.samples()) {
-    if (sample.tick() <= channel.last_tick) time_ns_ = 0;  // the bench was set back, and its clock with it
+    if (sample.tick() <= channel.last_tick) time_ns_ = 0;  // the bench was set back
     channel.last_tick = sample.tick();
     if (waiting_bytes_ >= kSamplesLimit) {
       ++channel.lost;

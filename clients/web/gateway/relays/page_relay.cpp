@@ -23,7 +23,7 @@ using boost::system::error_code;
 using namespace std::chrono_literals;
 
 constexpr auto kBetweenMessages = 4ms;    // to a browser: many small frames become one message
-constexpr std::size_t kMostAnswers = 16;  // to orders for the runs, that wait for the browser
+constexpr std::size_t kMostAnswers = 16;  // to orders for the runs; they wait for the browser
 
 Drive::Time now() {
   return std::chrono::steady_clock::now();
@@ -273,7 +273,7 @@ class PageRelay : public Relay, public std::enable_shared_from_this<PageRelay> {
   asio::steady_timer turnstile_;  // of what is written to the bench
   bool is_writing_ = false;
   bool may_run_ = false;                    // by its role with the bench
-  std::deque<std::string> told_of_runs_{};  // what the browser has not got
+  std::deque<std::string> told_of_runs_{};  // answers that wait for the browser
   std::optional<Leaving> leaving_{};
 };
 

@@ -86,7 +86,7 @@ export class Leases {
   /** Acts with the lease. The last one that needs it gives it back, unless the page holds it. */
   private async use<T>(axis: number, act: (answer: pb.Envelope) => Promise<T>): Promise<T> {
     const leased = this.leased[axis];
-    ++this.users[leased]; // from here on: another one must not give back what this one is given
+    ++this.users[leased]; // counted before it asks: an action that ends meanwhile must not give the lease back
     try {
       const answer = await this.ask(axis, ACTION_ACQUIRE);
       this.given[leased] = true;
@@ -95,7 +95,7 @@ export class Leases {
       const isLast = --this.users[leased] === 0 && this.owners[leased] === 0;
       if (isLast && this.given[leased]) {
         this.given[leased] = false;
-        await this.ask(axis, ACTION_RELEASE).catch(() => undefined); // it may have run out
+        await this.ask(axis, ACTION_RELEASE).catch(() => undefined); // the lease may have run out
       }
     }
   }

@@ -121,7 +121,7 @@ export class Trigger {
       return; // another setting has taken its place, or the connection is lost
     }
     if (setting !== this.setting) return;
-    if (this.firedTick === tick) this.firedTick = null; // else the next event is there already
+    if (this.firedTick === tick) this.firedTick = null; // otherwise it is the tick of the next event
     this.isArmed = this.settings.sweep !== "single";
     this.captured = { tick, rows: capturedRows(data, channels) };
     this.changed();

@@ -73,7 +73,7 @@ export class RunsPanel {
   enter(bench: Bench | null): void {
     this.bench = bench;
     this.draw();
-    if (bench !== null) this.ask(); // behind it may be another gateway
+    if (bench !== null) this.ask(); // another gateway may have taken the place of the last one
   }
 
   told({ said, is_refusal: isRefusal, run }: RunsAnswer): void {
