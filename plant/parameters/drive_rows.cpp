@@ -27,15 +27,15 @@ constexpr auto bus = row<&AxisParameters::drive, &DriveParameters::bus, Member>;
 template <auto Member>
 constexpr auto source = row<&AxisParameters::drive, &DriveParameters::source, Member>;
 
-constexpr auto kKinds = std::to_array<std::string_view>(
+constexpr auto kDriveKinds = std::to_array<std::string_view>(
     {"voltage_amplifier", "current_amplifier", "averaged_inverter", "switched_inverter", "source"});
 constexpr auto kWaveforms = std::to_array<std::string_view>({"sine", "trapezoid", "table"});
 
-constexpr auto kTable = std::to_array<Parameter>({
+constexpr auto kDriveTable = std::to_array<Parameter>({
     choice(row<&AxisParameters::drive, &DriveParameters::kind>(
                "drive.kind", "1", 0, 0, kInteger,
                "what stands between command and terminals; a source takes no commands"),
-           kKinds),
+           kDriveKinds),
 
     amplifier<&Amplifier::voltage_limit_v>("amplifier.voltage_limit_v", "V", 1e-3, 1e6, kLive | kRequired,
                                            "largest phase voltage, both signs; DC link voltage", {0.1, 1e5}),
@@ -118,7 +118,7 @@ constexpr auto kTable = std::to_array<Parameter>({
                              "field supply of any kind of drive; 0: the command has the field voltage"),
 });
 
-constexpr auto kCurves = std::to_array<CurveParameter>({
+constexpr auto kDriveCurves = std::to_array<CurveParameter>({
     {.name = "source.table",
      .x_unit = "1",
      .y_unit = "1",
@@ -187,11 +187,11 @@ void add_source_problems(const DriveParameters& p, Problems& found) {
 }  // namespace
 
 std::span<const Parameter> drive_rows() noexcept {
-  return kTable;
+  return kDriveTable;
 }
 
 std::span<const CurveParameter> drive_curves() noexcept {
-  return kCurves;
+  return kDriveCurves;
 }
 
 bool is_of_drive(std::string_view parameter) noexcept {
@@ -226,7 +226,7 @@ void add_shared_problems(const DriveParameters& p, Problems& found) {
   must_be_zero("inverter.bootstrap_s", p.inverter.bootstrap_s);
   if (p.kind == DriveKind::kCurrent || p.kind == DriveKind::kSource) {
     found.add("drive.kind", [&] {
-      return "is \"" + std::string(kKinds[static_cast<std::size_t>(p.kind)]) +
+      return "is \"" + std::string(kDriveKinds[static_cast<std::size_t>(p.kind)]) +
              "\" but two machines share voltage amplifiers and inverters only";
     });
   }

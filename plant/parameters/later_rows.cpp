@@ -20,7 +20,7 @@ constexpr Parameter comparator_row(std::string_view name, std::string_view unit,
 constexpr auto kShuntPlaces = std::to_array<std::string_view>({"inline", "low_side", "link"});
 
 template <auto Member>
-constexpr auto inverter = row<&AxisParameters::drive, &DriveParameters::inverter, Member>;
+constexpr auto inverter_row = row<&AxisParameters::drive, &DriveParameters::inverter, Member>;
 template <auto Member>
 constexpr auto ntc = row<&AxisParameters::sensors, &SensorParameters::ntc, Member>;
 template <auto Member>
@@ -33,7 +33,7 @@ constexpr auto shunts = row<&AxisParameters::sensors, &SensorParameters::shunts,
 using Comparator = ComparatorParameters;
 using Inverter = InverterParameters;
 
-constexpr auto kTable = std::to_array<Parameter>({
+constexpr auto kLaterTable = std::to_array<Parameter>({
     row<&AxisParameters::sensors, &SensorParameters::terminals>(
         "voltage_sensor.against_rail", "1", 0, 1, kInteger | kLater,
         "1: terminal_a_v and so on, against the negative rail"),
@@ -66,14 +66,15 @@ constexpr auto kTable = std::to_array<Parameter>({
         "of encoder_timer and encoder_capture; 0: none"),
     row<&AxisParameters::encoder, &EncoderParameters::capture_hz>("encoder.capture_hz", "Hz", 0, 1e9, kLater,
                                                                   "clock of encoder_capture; 0: none"),
-    inverter<&Inverter::switch_ohm>("inverter.switch_ohm", "ohm", 0, 1e3, kLive | kLater,
-                                    "R_ds(on) of a closed switch"),
-    inverter<&Inverter::diode_v>("inverter.diode_v", "V", 0, 100, kLive | kLater,
-                                 "forward voltage of a diode"),
-    inverter<&Inverter::break_current_a>("inverter.break_current_a", "A", 0, 1e6, kLive | kLater,
-                                         "a phase current beyond it opens all legs until cleared; 0: none"),
-    inverter<&Inverter::break_delay_s>("inverter.break_delay_s", "s", 0, 1e-2, kLive | kLater,
-                                       "from the cause until the legs are open"),
+    inverter_row<&Inverter::switch_ohm>("inverter.switch_ohm", "ohm", 0, 1e3, kLive | kLater,
+                                        "R_ds(on) of a closed switch"),
+    inverter_row<&Inverter::diode_v>("inverter.diode_v", "V", 0, 100, kLive | kLater,
+                                     "forward voltage of a diode"),
+    inverter_row<&Inverter::break_current_a>(
+        "inverter.break_current_a", "A", 0, 1e6, kLive | kLater,
+        "a phase current beyond it opens all legs until cleared; 0: none"),
+    inverter_row<&Inverter::break_delay_s>("inverter.break_delay_s", "s", 0, 1e-2, kLive | kLater,
+                                           "from the cause until the legs are open"),
     choice(shunts<&ShuntParameters::place>(
                "current_sensor.place", "1", 0, 0, kInteger | kLater,
                "inline: wires; low_side: lower switches; link: i_a and i_b are conversions of it"),
@@ -100,10 +101,10 @@ constexpr auto kTable = std::to_array<Parameter>({
     hall<&HallParameters::capture_bits>("hall.capture_bits", "bit", 0, 32, kInteger | kLater,
                                         "of hall_capture; 0: none"),
     hall<&HallParameters::capture_hz>("hall.capture_hz", "Hz", 0, 1e9, kLater, "clock of hall_capture"),
-    inverter<&Inverter::bootstrap_s>("inverter.bootstrap_s", "s", 0, 1e3, kLater,
-                                     "an upper switch opens after it; 0: never"),
-    inverter<&Inverter::bootstrap_recharge_s>("inverter.bootstrap_recharge_s", "s", 0, 1e3, kLater,
-                                              "a lower switch makes up for that within it"),
+    inverter_row<&Inverter::bootstrap_s>("inverter.bootstrap_s", "s", 0, 1e3, kLater,
+                                         "an upper switch opens after it; 0: never"),
+    inverter_row<&Inverter::bootstrap_recharge_s>("inverter.bootstrap_recharge_s", "s", 0, 1e3, kLater,
+                                                  "a lower switch makes up for that within it"),
 });
 
 bool has_bits(const SensorParameters& p) noexcept {
@@ -246,7 +247,7 @@ void add_ntc_problems(const SensorParameters& p, Problems& found) {
 }  // namespace
 
 std::span<const Parameter> later_rows() noexcept {
-  return kTable;
+  return kLaterTable;
 }
 
 void add_later_problems(const AxisParameters& p, Problems& found) {

@@ -19,7 +19,7 @@ constexpr Parameter shaft_row(std::string_view name, std::string_view unit, doub
   return row<&AxisParameters::mechanics, Member>(name, unit, minimum, maximum, traits, meaning, usual);
 }
 
-constexpr auto kTable = std::to_array<Parameter>({
+constexpr auto kMechanicsTable = std::to_array<Parameter>({
     shaft_row<&Shaft::inertia_kgm2>("mechanics.inertia_kgm2", "kg*m^2", 1e-12, 1e9, kLive | kRequired,
                                     "J of the rotor and all that turns with it", {1e-9, 1e5}),
     shaft_row<&Shaft::viscous_friction_nms>("mechanics.viscous_friction_nms", "N*m*s/rad", 0, 1e6, kLive,
@@ -59,7 +59,7 @@ constexpr auto kTable = std::to_array<Parameter>({
                                                    1e12, kLive, "at which it goes there"),
 });
 
-constexpr auto kCurves = std::to_array<CurveParameter>({
+constexpr auto kMechanicsCurves = std::to_array<CurveParameter>({
     {.name = "mechanics.load_profile",
      .x_unit = "s",
      .y_unit = "N*m",
@@ -74,11 +74,11 @@ constexpr auto kCurves = std::to_array<CurveParameter>({
 }  // namespace
 
 std::span<const Parameter> mechanics_rows() noexcept {
-  return kTable;
+  return kMechanicsTable;
 }
 
 std::span<const CurveParameter> mechanics_curves() noexcept {
-  return kCurves;
+  return kMechanicsCurves;
 }
 
 void add_problems(const MechanicsParameters& p, Problems& found) {

@@ -233,7 +233,7 @@ constexpr auto joined(const std::array<Parameter, Sizes>&... tables) {
   return all;
 }
 
-constexpr auto kTable =
+constexpr auto kSensorTable =
     joined(kEncoder, kCurrentSensor, kVoltageSensor, kNeutralSensor, kBusSensor, kTemperatureSensor,
            kTachometerChannel, kTachometer, kResolverChannel, kResolver, kOthers);
 
@@ -248,7 +248,7 @@ void add_delay_problem(std::string_view field, double ticks, Problems& found) {
 }  // namespace
 
 std::span<const Parameter> sensor_rows() noexcept {
-  return kTable;
+  return kSensorTable;
 }
 
 void add_problems(const EncoderParameters& p, Problems& found) {

@@ -12,7 +12,7 @@ using Transformer = TransformerParameters;
 template <auto Member>
 constexpr auto transformer = row<&AxisParameters::drive, &DriveParameters::transformer, Member>;
 
-constexpr auto kTable = std::to_array<Parameter>({
+constexpr auto kTransformerTable = std::to_array<Parameter>({
     transformer<&Transformer::turns_ratio>(
         "transformer.turns_ratio", "1", 0, 1e4, kReal,
         "secondary over primary, of a transformer in each phase of a source; 0: none"),
@@ -36,7 +36,7 @@ bool has_values(const Transformer& t) noexcept {
 }  // namespace
 
 std::span<const Parameter> transformer_rows() noexcept {
-  return kTable;
+  return kTransformerTable;
 }
 
 void add_transformer_problems(const DriveParameters& p, Problems& found) {

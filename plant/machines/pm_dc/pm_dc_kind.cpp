@@ -9,15 +9,14 @@
 namespace drivebench {
 namespace {
 
-using Machine = PmDcMachineParameters;
+using PmDc = PmDcMachineParameters;
 
-constexpr auto kTable = std::to_array<Parameter>({
-    machine_row<Machine, &Machine::armature_resistance_ohm>("machine.armature_resistance_ohm", "ohm", 1e-6,
-                                                            1e6, kLive | kRequired, "R, brushes included",
-                                                            {1e-4, 500}),
-    machine_row<Machine, &Machine::armature_inductance_h>("machine.armature_inductance_h", "H", 1e-9, 1e3,
-                                                          kRequired, "L", {1e-7, 3}),
-    machine_row<Machine, &Machine::torque_constant_nm_per_a>(
+constexpr auto kPmDcTable = std::to_array<Parameter>({
+    machine_row<PmDc, &PmDc::armature_resistance_ohm>("machine.armature_resistance_ohm", "ohm", 1e-6, 1e6,
+                                                      kLive | kRequired, "R, brushes included", {1e-4, 500}),
+    machine_row<PmDc, &PmDc::armature_inductance_h>("machine.armature_inductance_h", "H", 1e-9, 1e3,
+                                                    kRequired, "L", {1e-7, 3}),
+    machine_row<PmDc, &PmDc::torque_constant_nm_per_a>(
         "machine.torque_constant_nm_per_a", "N*m/A", 1e-9, 1e6, kLive | kRequired,
         "K_T, torque over current, and K_b, back-emf over speed", {1e-4, 200}),
 });
@@ -25,7 +24,7 @@ constexpr auto kTable = std::to_array<Parameter>({
 }  // namespace
 
 MachineKind PmDcMachine::kind() noexcept {
-  return {.name = "pm_dc", .rows = kTable, .make_train = make_drive_train<PmDcMachine>};
+  return {.name = "pm_dc", .rows = kPmDcTable, .make_train = make_drive_train<PmDcMachine>};
 }
 
 }  // namespace drivebench

@@ -11,26 +11,28 @@
 namespace drivebench {
 namespace {
 
-using Machine = SaturatedInductionMachineParameters;
+using SaturatedInduction = SaturatedInductionMachineParameters;
 
-constexpr auto kTable = std::to_array<Parameter>({
-    machine_row<Machine, &Machine::pole_pairs>("machine.pole_pairs", "1", 1, 1000, kInteger | kRequired,
-                                               "n_p", {1, 40}),
-    machine_row<Machine, &Machine::stator_resistance_ohm>("machine.stator_resistance_ohm", "ohm", 1e-6, 1e6,
-                                                          kLive | kRequired, "R_S, two-phase equivalent",
-                                                          {1e-4, 500}),
-    machine_row<Machine, &Machine::rotor_resistance_ohm>("machine.rotor_resistance_ohm", "ohm", 1e-6, 1e6,
-                                                         kLive | kRequired, "R_R, two-phase equivalent",
-                                                         {1e-4, 500}),
-    machine_row<Machine, &Machine::stator_leakage_h>("machine.stator_leakage_h", "H", 1e-9, 1e3, kRequired,
-                                                     "l_s = L_S - M, two-phase equivalent", {1e-6, 0.3}),
-    machine_row<Machine, &Machine::rotor_leakage_h>("machine.rotor_leakage_h", "H", 1e-9, 1e3, kRequired,
-                                                    "l_r = L_R - M, two-phase equivalent", {1e-6, 0.3}),
-    machine_row<Machine, &Machine::star>("machine.star", "1", 0, 1, kInteger,
-                                         "1: three phases in an isolated star, 0: two phases"),
+constexpr auto kSaturatedInductionTable = std::to_array<Parameter>({
+    machine_row<SaturatedInduction, &SaturatedInduction::pole_pairs>("machine.pole_pairs", "1", 1, 1000,
+                                                                     kInteger | kRequired, "n_p", {1, 40}),
+    machine_row<SaturatedInduction, &SaturatedInduction::stator_resistance_ohm>(
+        "machine.stator_resistance_ohm", "ohm", 1e-6, 1e6, kLive | kRequired, "R_S, two-phase equivalent",
+        {1e-4, 500}),
+    machine_row<SaturatedInduction, &SaturatedInduction::rotor_resistance_ohm>(
+        "machine.rotor_resistance_ohm", "ohm", 1e-6, 1e6, kLive | kRequired, "R_R, two-phase equivalent",
+        {1e-4, 500}),
+    machine_row<SaturatedInduction, &SaturatedInduction::stator_leakage_h>(
+        "machine.stator_leakage_h", "H", 1e-9, 1e3, kRequired, "l_s = L_S - M, two-phase equivalent",
+        {1e-6, 0.3}),
+    machine_row<SaturatedInduction, &SaturatedInduction::rotor_leakage_h>(
+        "machine.rotor_leakage_h", "H", 1e-9, 1e3, kRequired, "l_r = L_R - M, two-phase equivalent",
+        {1e-6, 0.3}),
+    machine_row<SaturatedInduction, &SaturatedInduction::star>(
+        "machine.star", "1", 0, 1, kInteger, "1: three phases in an isolated star, 0: two phases"),
 });
 
-constexpr auto kCurves = std::to_array<CurveParameter>({
+constexpr auto kSaturatedInductionCurves = std::to_array<CurveParameter>({
     {.name = "machine.magnetising_curve",
      .x_unit = "A",
      .y_unit = "Wb",
@@ -38,14 +40,16 @@ constexpr auto kCurves = std::to_array<CurveParameter>({
      .rising = true,
      .meaning = "magnetising flux over magnetising current, two-phase equivalent, from [0, 0] on",
      .get = [](const AxisParameters& p) noexcept -> const Curve& {
-       return std::get_if<Machine>(&p.machine)->magnetising_curve;
+       return std::get_if<SaturatedInduction>(&p.machine)->magnetising_curve;
      },
-     .set = [](AxisParameters& p,
-               Curve curve) { std::get_if<Machine>(&p.machine)->magnetising_curve = std::move(curve); }},
+     .set =
+         [](AxisParameters& p, Curve curve) {
+           std::get_if<SaturatedInduction>(&p.machine)->magnetising_curve = std::move(curve);
+         }},
 });
 
 /// The rules between the values.
-void add_broken_rules(const Machine& p, Problems& found) {
+void add_broken_saturated_induction_rules(const SaturatedInduction& p, Problems& found) {
   constexpr std::string_view kField = "machine.magnetising_curve";
   if (p.magnetising_curve.empty()) {
     found.add(kField, "has no points but needs two or more");
@@ -62,9 +66,9 @@ void add_broken_rules(const Machine& p, Problems& found) {
 
 MachineKind SaturatedInductionMachine::kind() noexcept {
   return {.name = "saturated_induction",
-          .rows = kTable,
-          .curves = kCurves,
-          .add_broken_rules = rules_of<add_broken_rules>,
+          .rows = kSaturatedInductionTable,
+          .curves = kSaturatedInductionCurves,
+          .add_broken_rules = rules_of<add_broken_saturated_induction_rules>,
           .make_train = make_drive_train<SaturatedInductionMachine>};
 }
 

@@ -9,22 +9,23 @@
 namespace drivebench {
 namespace {
 
-using Machine = ShuntDcMachineParameters;
+using ShuntDc = ShuntDcMachineParameters;
 
-constexpr auto kTable = std::to_array<Parameter>({
-    field_winding_rows::armature_resistance<Machine>(),
-    field_winding_rows::armature_inductance<Machine>(),
-    field_winding_rows::motor_constant<Machine>(),
-    field_winding_rows::field_resistance<Machine>(),
-    machine_row<Machine, &Machine::adjusting_resistance_ohm>(
+constexpr auto kShuntDcTable = std::to_array<Parameter>({
+    field_winding_rows::armature_resistance<ShuntDc>(),
+    field_winding_rows::armature_inductance<ShuntDc>(),
+    field_winding_rows::motor_constant<ShuntDc>(),
+    field_winding_rows::field_resistance<ShuntDc>(),
+    machine_row<ShuntDc, &ShuntDc::adjusting_resistance_ohm>(
         "machine.adjusting_resistance_ohm", "ohm", 0, 1e6, kLive, "R_adj in series with the field winding"),
-    field_winding_rows::field_inductance<Machine>(),
+    field_winding_rows::field_inductance<ShuntDc>(),
 });
 
-constexpr auto kCurves = std::to_array<CurveParameter>({field_winding_rows::saturation_curve<Machine>()});
+constexpr auto kShuntDcCurves =
+    std::to_array<CurveParameter>({field_winding_rows::saturation_curve<ShuntDc>()});
 
 /// The rules between the values.
-void add_broken_rules(const Machine& p, Problems& found) {
+void add_broken_shunt_dc_rules(const ShuntDc& p, Problems& found) {
   field_winding_rows::add_problems(p.field_inductance_h, p.saturation_curve, found);
 }
 
@@ -33,9 +34,9 @@ void add_broken_rules(const Machine& p, Problems& found) {
 MachineKind ShuntDcMachine::kind() noexcept {
   return {.name = "shunt_dc",
           .field = FieldSupply::kOnArmature,
-          .rows = kTable,
-          .curves = kCurves,
-          .add_broken_rules = rules_of<add_broken_rules>,
+          .rows = kShuntDcTable,
+          .curves = kShuntDcCurves,
+          .add_broken_rules = rules_of<add_broken_shunt_dc_rules>,
           .make_train = make_drive_train<ShuntDcMachine>};
 }
 
