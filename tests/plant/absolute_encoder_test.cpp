@@ -12,7 +12,7 @@
 #include "plant/parameters/parameters.hpp"
 #include "tests/plant/servo_axis.hpp"
 
-namespace drivebench {
+namespace drivebench::absolute_encoder_test {
 namespace {
 
 constexpr double kTick_s = 100e-6;
@@ -143,4 +143,4 @@ TEST(AbsoluteEncoder, TheRulesNameTheFieldAndTheReason) {
 }
 
 }  // namespace
-}  // namespace drivebench
+}  // namespace drivebench::absolute_encoder_test

@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace drivebench {
+namespace drivebench::amplifier_test {
 namespace {
 
 // Catches: a gain that reaches the offset, offsets exchanged, a phase or the field forgotten.
@@ -39,4 +39,4 @@ TEST(Amplifier, TheFilterGoesTowardsItsInputAndStaysOnIt) {
 }
 
 }  // namespace
-}  // namespace drivebench
+}  // namespace drivebench::amplifier_test

@@ -8,7 +8,7 @@
 #include "plant/sensors/current_sensor.hpp"
 #include "tests/plant/analog_reading.hpp"
 
-namespace drivebench {
+namespace drivebench::analog_channel_test {
 namespace {
 
 // Catches: an offset under the gain, noise that the gain scales, a converter where none is.
@@ -69,4 +69,4 @@ TEST(AnalogChannel, ADelayIsNoneHalfATickOrWholeTicksUpToEight) {
 }
 
 }  // namespace
-}  // namespace drivebench
+}  // namespace drivebench::analog_channel_test

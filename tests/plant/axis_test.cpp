@@ -10,7 +10,7 @@
 
 #include "tests/plant/servo_axis.hpp"
 
-namespace drivebench {
+namespace drivebench::axis_test {
 namespace {
 
 constexpr double kTurn_rad = 2.0 * std::numbers::pi;
@@ -194,4 +194,4 @@ TEST(Axis, SubstepsOfATickAreTheSameAsShortTicks) {
 }
 
 }  // namespace
-}  // namespace drivebench
+}  // namespace drivebench::axis_test

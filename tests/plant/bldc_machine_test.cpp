@@ -12,7 +12,7 @@
 #include "tests/plant/bldc_motor.hpp"
 #include "tests/plant/power_balance.hpp"
 
-namespace drivebench {
+namespace drivebench::bldc_machine_test {
 namespace {
 
 using namespace bldc_motor;
@@ -229,4 +229,4 @@ TEST(BldcMachine, MutualInductanceMustStayBelowHalfOfTheSelfInductance) {
 }
 
 }  // namespace
-}  // namespace drivebench
+}  // namespace drivebench::bldc_machine_test

@@ -11,7 +11,7 @@
 #include "plant/math/rk4.hpp"
 #include "tests/plant/bldc_motor.hpp"
 
-namespace drivebench {
+namespace drivebench::bldc_phases_test {
 namespace {
 
 using namespace bldc_motor;
@@ -264,4 +264,4 @@ TEST(BldcPhases, TheOpenLoopTrapezoidalDriveSynchronisesAsInTheReference) {
 }
 
 }  // namespace
-}  // namespace drivebench
+}  // namespace drivebench::bldc_phases_test

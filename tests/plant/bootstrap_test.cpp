@@ -11,7 +11,7 @@
 #include "plant/parameters/parameters.hpp"
 #include "tests/plant/bridge_rig.hpp"
 
-namespace drivebench {
+namespace drivebench::bootstrap_test {
 namespace {
 
 using namespace bridge_rig;
@@ -207,4 +207,4 @@ TEST(Bootstrap, TheRulesNameTheFieldAndTheReason) {
 }
 
 }  // namespace
-}  // namespace drivebench
+}  // namespace drivebench::bootstrap_test

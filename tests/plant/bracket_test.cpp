@@ -7,7 +7,7 @@
 #include <cmath>
 #include <random>
 
-namespace drivebench {
+namespace drivebench::bracket_test {
 namespace {
 
 /// The guesses, none beyond the ends, until the value is below 1e-13 of those there or nothing is between
@@ -61,4 +61,4 @@ TEST(Bracket, BentLinesAreFoundToo) {
 }
 
 }  // namespace
-}  // namespace drivebench
+}  // namespace drivebench::bracket_test

@@ -7,7 +7,7 @@
 #include "tests/plant/bridge_rig.hpp"
 #include "tests/plant/servo_axis.hpp"
 
-namespace drivebench {
+namespace drivebench::break_input_test {
 namespace {
 
 using namespace bridge_rig;
@@ -172,4 +172,4 @@ TEST(BreakInput, TheRulesNameTheKindOfDrive) {
 }
 
 }  // namespace
-}  // namespace drivebench
+}  // namespace drivebench::break_input_test

@@ -12,7 +12,7 @@
 #include "tests/plant/bldc_motor.hpp"
 #include "tests/plant/drive_rig.hpp"
 
-namespace drivebench {
+namespace drivebench::comparators_test {
 namespace {
 
 constexpr double kPeriod_s = 50e-6;
@@ -353,4 +353,4 @@ TEST(Comparators, TheRulesNameTheFieldAndTheReason) {
 }
 
 }  // namespace
-}  // namespace drivebench
+}  // namespace drivebench::comparators_test

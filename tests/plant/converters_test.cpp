@@ -7,7 +7,7 @@
 #include "plant/parameters/parameters.hpp"
 #include "tests/plant/servo_axis.hpp"
 
-namespace drivebench {
+namespace drivebench::converters_test {
 namespace {
 
 AxisParameters counted_axis() {
@@ -123,4 +123,4 @@ TEST(Converters, TheRulesNameWhatIsMissing) {
 }
 
 }  // namespace
-}  // namespace drivebench
+}  // namespace drivebench::converters_test

@@ -7,7 +7,7 @@
 
 #include "tests/plant/drive_rig.hpp"
 
-namespace drivebench {
+namespace drivebench::current_loop_test {
 namespace {
 
 /// Tag CUR-01 of the reference: L = 2 mH, R = 2 ohm, K_P = 20 V/A, alpha = R/L = 1000 1/s.
@@ -139,4 +139,4 @@ TEST(CurrentLoop, TheAmplifierIsWithinTheLoop) {
 }
 
 }  // namespace
-}  // namespace drivebench
+}  // namespace drivebench::current_loop_test

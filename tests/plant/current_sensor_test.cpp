@@ -8,7 +8,7 @@
 #include "tests/plant/analog_reading.hpp"
 #include "tests/plant/servo_axis.hpp"
 
-namespace drivebench {
+namespace drivebench::current_sensor_test {
 namespace {
 
 // Catches: an ideal sensor that quantises, limits, or loses gain, offset or noise.
@@ -116,4 +116,4 @@ TEST(CurrentSensor, EachPhaseHasItsOwnGainAndOffsetAndSaturationIsAFaultBit) {
 }
 
 }  // namespace
-}  // namespace drivebench
+}  // namespace drivebench::current_sensor_test

@@ -7,7 +7,7 @@
 #include <random>
 #include <vector>
 
-namespace drivebench {
+namespace drivebench::curve_test {
 namespace {
 
 const std::vector<CurvePoint> kPoints{{1.0, 2.0}, {2.0, 4.0}, {4.0, 5.0}, {8.0, 5.5}};
@@ -122,4 +122,4 @@ TEST(Curve, NamesTheFirstBadPoint) {
 }
 
 }  // namespace
-}  // namespace drivebench
+}  // namespace drivebench::curve_test

@@ -13,7 +13,7 @@
 #include "tests/plant/drive_rig.hpp"
 #include "tests/plant/servo_axis.hpp"
 
-namespace drivebench {
+namespace drivebench::dc_bus_test {
 namespace {
 
 constexpr BusParameters kBus{.voltage_v = 300.0,
@@ -307,4 +307,4 @@ TEST(DcBus, ABrakingMachineChargesTheBattery) {
 }
 
 }  // namespace
-}  // namespace drivebench
+}  // namespace drivebench::dc_bus_test

@@ -6,7 +6,7 @@
 
 #include "plant/parameters/machine_kind.hpp"
 
-namespace drivebench {
+namespace drivebench::dc_machine_rows_test {
 namespace {
 
 template <class Machine>
@@ -99,4 +99,4 @@ TEST(DcMachineRows, TheRulesBetweenTheValuesAreSentences) {
 }
 
 }  // namespace
-}  // namespace drivebench
+}  // namespace drivebench::dc_machine_rows_test

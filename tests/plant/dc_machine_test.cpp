@@ -9,13 +9,13 @@
 
 #include "tests/plant/dc_rig.hpp"
 
-namespace drivebench {
+namespace drivebench::dc_machine_test {
 namespace {
 
 /// Motor DC-A of the reference: the book, chapter 1, problem 8.
 constexpr PmDcMachineParameters kDcA{
     .armature_resistance_ohm = 2.0, .armature_inductance_h = 2e-3, .torque_constant_nm_per_a = 0.07};
-constexpr RigLoad kDcALoad{.inertia_kgm2 = 6e-5, .friction_nms = 4e-4};
+constexpr ShaftLoad kDcALoad{.inertia_kgm2 = 6e-5, .friction_nms = 4e-4};
 constexpr double kStep_s = 50e-6;
 
 using DcRig = Rig<PmDcMachineState>;
@@ -156,4 +156,4 @@ TEST(PmDcMachine, AdjustmentsChangeResistanceInductanceAndMagnet) {
 }
 
 }  // namespace
-}  // namespace drivebench
+}  // namespace drivebench::dc_machine_test

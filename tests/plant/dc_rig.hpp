@@ -26,7 +26,7 @@ struct Rig {
   RigEnergy energy{};
 };
 
-struct RigLoad {
+struct ShaftLoad {
   double inertia_kgm2;
   double friction_nms = 0.0;
   double load_nm = 0.0;
@@ -50,7 +50,7 @@ inline TerminalInput open_terminals(double field_v = 0.0) {
 }
 
 template <class Constants, class State>
-void step(Rig<State>& rig, double step_s, const Constants& c, const TerminalInput& u, const RigLoad& load) {
+void step(Rig<State>& rig, double step_s, const Constants& c, const TerminalInput& u, const ShaftLoad& load) {
   rig = rk4_step(rig, step_s, [&](const Rig<State>& x) noexcept -> Rig<State> {
     const RotorMotion motion = motion_at(c, x.shaft.angle_rad, x.shaft.speed_rad_s);
     const double torque = torque_nm(c, x.machine, motion);
@@ -65,7 +65,7 @@ void step(Rig<State>& rig, double step_s, const Constants& c, const TerminalInpu
 /// The energy that went in, less the losses and the energy in windings and shaft: constant if energy is
 /// conserved. Without a load.
 template <class Constants, class State>
-double unaccounted_j(const Rig<State>& rig, const Constants& c, const RigLoad& load) {
+double unaccounted_j(const Rig<State>& rig, const Constants& c, const ShaftLoad& load) {
   const double speed_rad_s = rig.shaft.speed_rad_s;
   return rig.energy.drawn_j - rig.energy.copper_j - rig.energy.friction_j -
          stored_energy_j(c, rig.machine, motion_at(c, rig.shaft.angle_rad, speed_rad_s)) -
@@ -74,7 +74,7 @@ double unaccounted_j(const Rig<State>& rig, const Constants& c, const RigLoad& l
 
 template <class Constants, class State>
 void run(Rig<State>& rig, double duration_s, double step_s, const Constants& c, const TerminalInput& u,
-         const RigLoad& load) {
+         const ShaftLoad& load) {
   const long steps = std::lround(duration_s / step_s);
   for (long k = 0; k < steps; ++k)
     step(rig, step_s, c, u, load);
@@ -86,6 +86,6 @@ inline Curve wound_saturation() {
 }
 
 /// A shaft so heavy that it keeps its speed.
-inline constexpr RigLoad kFlywheel{.inertia_kgm2 = 1e30};
+inline constexpr ShaftLoad kFlywheel{.inertia_kgm2 = 1e30};
 
 }  // namespace drivebench

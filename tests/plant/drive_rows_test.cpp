@@ -9,7 +9,7 @@
 
 #include "plant/parameters/transformer_rows.hpp"
 
-namespace drivebench {
+namespace drivebench::drive_rows_test {
 namespace {
 
 std::vector<std::string> fields(const DriveParameters& p) {
@@ -136,4 +136,4 @@ TEST(DriveRows, TheDeadTimeFitsIntoTheCarrierPeriod) {
 }
 
 }  // namespace
-}  // namespace drivebench
+}  // namespace drivebench::drive_rows_test

@@ -9,7 +9,7 @@
 
 #include "tests/plant/drive_rig.hpp"
 
-namespace drivebench {
+namespace drivebench::drive_test {
 namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
@@ -358,4 +358,4 @@ TEST(Drive, ReadingAnIntervalTwiceGivesTheSame) {
 }
 
 }  // namespace
-}  // namespace drivebench
+}  // namespace drivebench::drive_test

@@ -9,7 +9,7 @@
 #include "tests/plant/bldc_motor.hpp"
 #include "tests/plant/drive_rig.hpp"
 
-namespace drivebench {
+namespace drivebench::edges_test {
 namespace {
 
 constexpr double kLink_v = 300.0;
@@ -225,4 +225,4 @@ TEST(Edges, AListOutOfOrderEndsAndTheMaskOfLegsHolds) {
 }
 
 }  // namespace
-}  // namespace drivebench
+}  // namespace drivebench::edges_test

@@ -14,7 +14,7 @@
 
 #include "tests/plant/encoder_motion.hpp"
 
-namespace drivebench {
+namespace drivebench::encoder_edges_test {
 namespace {
 
 using namespace encoder_motion;
@@ -196,4 +196,4 @@ TEST(EncoderEdges, EveryReversalOfASegmentIsSeen) {
 }
 
 }  // namespace
-}  // namespace drivebench
+}  // namespace drivebench::encoder_edges_test

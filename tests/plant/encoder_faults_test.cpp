@@ -10,7 +10,7 @@
 #include "plant/sensors/encoder.hpp"
 #include "tests/plant/encoder_motion.hpp"
 
-namespace drivebench {
+namespace drivebench::encoder_faults_test {
 namespace {
 
 using namespace encoder_motion;
@@ -348,4 +348,4 @@ TEST(EncoderFaults, EccentricityThatComesAndGoesJumpsAtTheStartOfTheTick) {
 }
 
 }  // namespace
-}  // namespace drivebench
+}  // namespace drivebench::encoder_faults_test

@@ -9,7 +9,7 @@
 
 #include "tests/plant/encoder_motion.hpp"
 
-namespace drivebench {
+namespace drivebench::encoder_test {
 namespace {
 
 using namespace encoder_motion;
@@ -213,4 +213,4 @@ TEST(Encoder, ACountThatRoundingChangesBetweenTicksStillHasItsEdge) {
 }
 
 }  // namespace
-}  // namespace drivebench
+}  // namespace drivebench::encoder_test

@@ -3,7 +3,7 @@
 
 #include <gtest/gtest.h>
 
-namespace drivebench {
+namespace drivebench::events_test {
 namespace {
 
 EventValues values_of(double first, double second) {
@@ -62,4 +62,4 @@ TEST(Events, WithoutAPassageThroughZeroThereIsNone) {
 }
 
 }  // namespace
-}  // namespace drivebench
+}  // namespace drivebench::events_test

@@ -7,7 +7,7 @@
 #include <limits>
 #include <random>
 
-namespace drivebench {
+namespace drivebench::exponential_test {
 namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
@@ -101,4 +101,4 @@ TEST(Exponential, PowerTakesTheSpecialValues) {
 }
 
 }  // namespace
-}  // namespace drivebench
+}  // namespace drivebench::exponential_test

@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
-namespace drivebench {
+namespace drivebench::first_order_test {
 namespace {
 
 long double wide(double x) {
@@ -67,4 +67,4 @@ TEST(FirstOrder, ARampFollowsTheEquation) {
 }
 
 }  // namespace
-}  // namespace drivebench
+}  // namespace drivebench::first_order_test

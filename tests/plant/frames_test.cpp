@@ -5,7 +5,7 @@
 #include <cmath>
 #include <random>
 
-namespace drivebench {
+namespace drivebench::frames_test {
 namespace {
 
 constexpr double kThirdTurn_rad = 0x1.0c152382d7366p+1;  // 2 pi/3
@@ -110,4 +110,4 @@ TEST(Frames, TheReferenceCurrentVectorIsReproduced) {
 }
 
 }  // namespace
-}  // namespace drivebench
+}  // namespace drivebench::frames_test

@@ -6,7 +6,7 @@
 
 #include "tests/plant/servo_axis.hpp"
 
-namespace drivebench {
+namespace drivebench::freewheel_test {
 namespace {
 
 constexpr PhaseCommand volts(double a, double b) {
@@ -223,4 +223,4 @@ TEST(Freewheel, ARectifierOfSixPulsesHasSixEventsInATurn) {
 }
 
 }  // namespace
-}  // namespace drivebench
+}  // namespace drivebench::freewheel_test

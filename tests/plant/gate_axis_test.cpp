@@ -14,7 +14,7 @@
 #include "tests/plant/bridge_rig.hpp"
 #include "tests/plant/gate_course.hpp"
 
-namespace drivebench {
+namespace drivebench::gate_axis_test {
 namespace {
 
 using namespace bridge_rig;
@@ -341,4 +341,4 @@ TEST(GateAxis, AStiffLinkHasItsNewVoltageAtOnce) {
 }
 
 }  // namespace
-}  // namespace drivebench
+}  // namespace drivebench::gate_axis_test

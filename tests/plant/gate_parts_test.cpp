@@ -11,7 +11,7 @@
 #include "plant/gate_axis.hpp"
 #include "tests/plant/gate_course.hpp"
 
-namespace drivebench {
+namespace drivebench::gate_parts_test {
 namespace {
 
 using namespace gate_course;
@@ -148,4 +148,4 @@ TEST(GateParts, ATimerThatWouldStayWrongIsRefused) {
 }
 
 }  // namespace
-}  // namespace drivebench
+}  // namespace drivebench::gate_parts_test

@@ -9,7 +9,7 @@
 #include "plant/mechanics/shaft.hpp"
 #include "tests/plant/shaft_run.hpp"
 
-namespace drivebench {
+namespace drivebench::gear_test {
 namespace {
 
 using RigidRun = ShaftRun<ShaftState>;
@@ -229,4 +229,4 @@ TEST(Gear, MassesEventsAndTimeConstantFollowTheParameters) {
 }
 
 }  // namespace
-}  // namespace drivebench
+}  // namespace drivebench::gear_test

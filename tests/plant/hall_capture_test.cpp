@@ -12,7 +12,7 @@
 #include "tests/plant/bridge_rig.hpp"
 #include "tests/plant/servo_axis.hpp"
 
-namespace drivebench {
+namespace drivebench::hall_capture_test {
 namespace {
 
 constexpr double kTick_s = 100e-6;
@@ -243,4 +243,4 @@ TEST(HallCapture, TheRulesNameWhatIsMissing) {
 }
 
 }  // namespace
-}  // namespace drivebench
+}  // namespace drivebench::hall_capture_test

@@ -7,7 +7,7 @@
 #include <cstdint>
 #include <numbers>
 
-namespace drivebench {
+namespace drivebench::hall_test {
 namespace {
 
 constexpr HallParameters kHall{.enabled = true};
@@ -71,4 +71,4 @@ TEST(Hall, ASensorThatIsOffReadsZero) {
 }
 
 }  // namespace
-}  // namespace drivebench
+}  // namespace drivebench::hall_test

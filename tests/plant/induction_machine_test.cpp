@@ -12,7 +12,7 @@
 #include "tests/plant/power_balance.hpp"
 #include "tests/plant/servo_axis.hpp"
 
-namespace drivebench {
+namespace drivebench::induction_machine_test {
 namespace {
 
 using induction_motors::turning;
@@ -212,4 +212,4 @@ TEST(InductionMachine, TheFastestTimeConstantIsThatOfCurrentAndFluxTogether) {
 }
 
 }  // namespace
-}  // namespace drivebench
+}  // namespace drivebench::induction_machine_test

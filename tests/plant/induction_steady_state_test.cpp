@@ -15,7 +15,7 @@
 #include "plant/math/rk4.hpp"
 #include "tests/plant/induction_motors.hpp"
 
-namespace drivebench {
+namespace drivebench::induction_steady_state_test {
 namespace {
 
 using namespace induction_motors;
@@ -302,4 +302,4 @@ TEST(InductionSteadyState, MachinesWithScaledRotorsAreIndistinguishableAtTheTerm
 }
 
 }  // namespace
-}  // namespace drivebench
+}  // namespace drivebench::induction_steady_state_test

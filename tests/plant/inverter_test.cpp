@@ -10,7 +10,7 @@
 
 #include "tests/plant/drive_rig.hpp"
 
-namespace drivebench {
+namespace drivebench::inverter_test {
 namespace {
 
 constexpr double kBus_v = 300.0;
@@ -294,4 +294,4 @@ TEST(Inverter, TerminalsThatDoNotExistAreAtZero) {
 }
 
 }  // namespace
-}  // namespace drivebench
+}  // namespace drivebench::inverter_test

@@ -13,7 +13,7 @@
 #include "tests/plant/drive_rig.hpp"
 #include "tests/plant/servo_axis.hpp"
 
-namespace drivebench {
+namespace drivebench::legs_test {
 namespace {
 
 constexpr double kLink_v = 300.0;
@@ -402,4 +402,4 @@ TEST(Legs, AWindingBetweenTwoLegsShowsItsFirstLeg) {
 }
 
 }  // namespace
-}  // namespace drivebench
+}  // namespace drivebench::legs_test

@@ -8,13 +8,13 @@
 
 #include "tests/plant/dc_rig.hpp"
 
-namespace drivebench {
+namespace drivebench::linear_dc_machine_test {
 namespace {
 
 /// The book gives no numbers: a bar of 0.2 kg that reaches 5 m/s at 10 V but for its friction.
 constexpr LinearDcMachineParameters kBar{
     .resistance_ohm = 0.5, .inductance_h = 1e-5, .flux_density_t = 4.0, .bar_length_m = 0.5};
-constexpr RigLoad kSlide{.inertia_kgm2 = 0.2, .friction_nms = 0.8};  // kg and N s/m
+constexpr ShaftLoad kSlide{.inertia_kgm2 = 0.2, .friction_nms = 0.8};  // kg and N s/m
 constexpr double kVoltage_v = 10.0;
 
 using BarRig = Rig<PmDcMachineState>;
@@ -115,4 +115,4 @@ TEST(LinearDcMachine, OpensAndAdjustsAsTheOtherArmaturesDo) {
 }
 
 }  // namespace
-}  // namespace drivebench
+}  // namespace drivebench::linear_dc_machine_test

@@ -11,7 +11,7 @@
 #include "plant/mechanics/shaft.hpp"
 #include "plant/parameters/mechanics_rows.hpp"
 
-namespace drivebench {
+namespace drivebench::load_profile_test {
 namespace {
 
 const Parameter& row_named(std::string_view name) {
@@ -144,4 +144,4 @@ TEST(MechanicsRows, AProblemNamesTheValueThatDoesNotFitTheOthers) {
 }
 
 }  // namespace
-}  // namespace drivebench
+}  // namespace drivebench::load_profile_test

@@ -8,7 +8,7 @@
 #include "plant/mechanics/load.hpp"
 #include "tests/plant/servo_axis.hpp"
 
-namespace drivebench {
+namespace drivebench::mechanics_test {
 namespace {
 
 constexpr PhaseCommand kShorted{.gates = Gates::kZeroVoltage, .setpoint = {}};
@@ -239,4 +239,4 @@ TEST(Mechanics, ALoadRampGoesFromThePresentValueToTheTargetInItsTicks) {
 }
 
 }  // namespace
-}  // namespace drivebench
+}  // namespace drivebench::mechanics_test

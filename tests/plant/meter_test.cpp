@@ -5,7 +5,7 @@
 #include <cmath>
 #include <numbers>
 
-namespace drivebench {
+namespace drivebench::meter_test {
 namespace {
 
 constexpr double kTurn_rad = 2.0 * std::numbers::pi;
@@ -132,4 +132,4 @@ TEST(Meter, NoCurrentReadsAsZeroAndADirectCurrentHasNoReactivePower) {
 }
 
 }  // namespace
-}  // namespace drivebench
+}  // namespace drivebench::meter_test

@@ -9,7 +9,7 @@
 #include <cstdint>
 #include <vector>
 
-namespace drivebench {
+namespace drivebench::noise_test {
 namespace {
 
 constexpr std::uint64_t kCount = 400'000;
@@ -154,4 +154,4 @@ TEST(Noise, TheExtremeWordsStayInTheirRange) {
 }
 
 }  // namespace
-}  // namespace drivebench
+}  // namespace drivebench::noise_test

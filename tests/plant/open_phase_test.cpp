@@ -10,7 +10,7 @@
 
 #include "plant/axis.hpp"
 
-namespace drivebench {
+namespace drivebench::open_phase_test {
 namespace {
 
 constexpr double kPi = std::numbers::pi;
@@ -294,4 +294,4 @@ TEST(OpenPhase, AFieldThatRisesFeedsTheDiodesAtStandstill) {
 }
 
 }  // namespace
-}  // namespace drivebench
+}  // namespace drivebench::open_phase_test

@@ -10,7 +10,7 @@
 
 #include "tests/plant/servo_axis.hpp"
 
-namespace drivebench {
+namespace drivebench::parameters_test {
 namespace {
 
 bool names(const std::vector<Problem>& found, std::string_view field) {
@@ -153,4 +153,4 @@ TEST(Parameters, ARuleNamesTheValueTheLimitsAndTheUnit) {
 }
 
 }  // namespace
-}  // namespace drivebench
+}  // namespace drivebench::parameters_test

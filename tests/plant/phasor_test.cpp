@@ -8,7 +8,7 @@
 #include <numbers>
 #include <random>
 
-namespace drivebench {
+namespace drivebench::phasor_test {
 namespace {
 
 using Complex = std::complex<double>;
@@ -71,4 +71,4 @@ TEST(Phasor, AnUnboundedAngleIsRightToItsLastBit) {
 }
 
 }  // namespace
-}  // namespace drivebench
+}  // namespace drivebench::phasor_test

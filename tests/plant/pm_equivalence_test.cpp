@@ -10,7 +10,7 @@
 
 /// The same machine described in two ways must move in the same way. The one to compare with is written
 /// here from the book's equations and shares no code with the machines.
-namespace drivebench {
+namespace drivebench::pm_equivalence_test {
 namespace {
 
 constexpr double kThird_rad = 2.0 * std::numbers::pi / 3.0;
@@ -278,4 +278,4 @@ TEST(PmEquivalence, TheThreePhaseWoundRotorMovesAsItsTwoPhaseEquivalent) {
 }
 
 }  // namespace
-}  // namespace drivebench
+}  // namespace drivebench::pm_equivalence_test

@@ -10,7 +10,7 @@
 
 #include "tests/plant/power_balance.hpp"
 
-namespace drivebench {
+namespace drivebench::pm_machine_test {
 namespace {
 
 constexpr PmMachineParameters kStepper{.pole_pairs = 50,
@@ -263,4 +263,4 @@ TEST(PmMachine, TheEmfIsTheRateOfTheRotorFlux) {
 }
 
 }  // namespace
-}  // namespace drivebench
+}  // namespace drivebench::pm_machine_test

@@ -9,7 +9,7 @@
 #include "tests/plant/power_balance.hpp"
 
 /// The PM machine as a hybrid stepping motor, with inertia and friction of its own.
-namespace drivebench {
+namespace drivebench::pm_stepper_test {
 namespace {
 
 constexpr PmMachineParameters kStepper{.pole_pairs = 50,
@@ -162,4 +162,4 @@ TEST(PmStepper, TooFastAStepperLosesFourStepsAtATime) {
 }
 
 }  // namespace
-}  // namespace drivebench
+}  // namespace drivebench::pm_stepper_test

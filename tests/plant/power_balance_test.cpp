@@ -8,7 +8,7 @@
 #include "tests/plant/dc_rig.hpp"
 #include "tests/plant/induction_motors.hpp"
 
-namespace drivebench {
+namespace drivebench::power_balance_test {
 namespace {
 
 /// The source that a machine is connected to while it starts from rest, and the load that it turns.
@@ -27,7 +27,7 @@ template <class Machine>
 void expect_energy_kept(const typename Machine::Parameters& p, const Start& start) {
   SCOPED_TRACE(Machine::kind().name);
   const auto c = constants_of(p);
-  const RigLoad load{.inertia_kgm2 = start.inertia_kgm2};
+  const ShaftLoad load{.inertia_kgm2 = start.inertia_kgm2};
   Rig<typename Machine::State> rig;
   double exchanged_j = 0.0;
   double top_rad_s = 0.0;
@@ -138,4 +138,4 @@ TEST(PowerBalance, MachinesWithKinksKeepTheirEnergyToo) {
 }
 
 }  // namespace
-}  // namespace drivebench
+}  // namespace drivebench::power_balance_test

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <numbers>
 
-namespace drivebench {
+namespace drivebench::resolver_test {
 namespace {
 
 // Catches: sine and cosine exchanged, the pole pairs left out, an angle that turns the other way.
@@ -29,4 +29,4 @@ TEST(Resolver, EachWindingHasItsOwnAmplitude) {
 }
 
 }  // namespace
-}  // namespace drivebench
+}  // namespace drivebench::resolver_test

@@ -8,7 +8,7 @@
 
 #include "tests/plant/servo_axis.hpp"
 
-namespace drivebench {
+namespace drivebench::rk4_test {
 namespace {
 
 struct Pair {
@@ -99,4 +99,4 @@ TEST(Rk4, HalvingTheStepDividesTheErrorOfTheMotorBySixteen) {
 }
 
 }  // namespace
-}  // namespace drivebench
+}  // namespace drivebench::rk4_test

@@ -4,7 +4,7 @@
 
 #include <cmath>
 
-namespace drivebench {
+namespace drivebench::rotated_test {
 namespace {
 
 // Catches: a wrong coefficient, a turn in the wrong direction. The tolerance is the first term left out.
@@ -28,4 +28,4 @@ TEST(Rotated, ByNothingIsTheStart) {
 }
 
 }  // namespace
-}  // namespace drivebench
+}  // namespace drivebench::rotated_test

@@ -15,7 +15,7 @@
 #include "plant/math/rk4.hpp"
 #include "plant/parameters/machine_kind.hpp"
 
-namespace drivebench {
+namespace drivebench::saturated_induction_machine_test {
 namespace {
 
 /// The servo motor of the book (IM-04) with a magnetising curve that bends.
@@ -368,4 +368,4 @@ TEST(SaturatedInductionMachine, TheCurveMustBeginAtTheOriginAndRise) {
 }
 
 }  // namespace
-}  // namespace drivebench
+}  // namespace drivebench::saturated_induction_machine_test

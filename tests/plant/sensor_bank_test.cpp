@@ -10,7 +10,7 @@
 #include "plant/math/noise.hpp"
 #include "tests/plant/sensor_point.hpp"
 
-namespace drivebench {
+namespace drivebench::sensor_bank_test {
 namespace {
 
 using namespace sensor_point;
@@ -285,4 +285,4 @@ TEST(SensorBank, TheMeterShowsEachWholeWindowUntilTheNext) {
 }
 
 }  // namespace
-}  // namespace drivebench
+}  // namespace drivebench::sensor_bank_test

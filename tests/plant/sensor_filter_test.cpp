@@ -8,7 +8,7 @@
 
 #include "tests/plant/sensor_point.hpp"
 
-namespace drivebench {
+namespace drivebench::sensor_filter_test {
 namespace {
 
 using namespace sensor_point;
@@ -157,4 +157,4 @@ TEST(SensorFilter, AFilteredResolverLagsAsTheFilterSays) {
 }
 
 }  // namespace
-}  // namespace drivebench
+}  // namespace drivebench::sensor_filter_test

@@ -8,7 +8,7 @@
 #include <string_view>
 #include <vector>
 
-namespace drivebench {
+namespace drivebench::sensor_rows_test {
 namespace {
 
 AxisParameters usable() {
@@ -136,4 +136,4 @@ TEST(SensorRows, BrokenRulesBetweenValuesAreNamed) {
 }
 
 }  // namespace
-}  // namespace drivebench
+}  // namespace drivebench::sensor_rows_test

@@ -7,7 +7,7 @@
 
 #include "tests/plant/dc_rig.hpp"
 
-namespace drivebench {
+namespace drivebench::series_dc_machine_test {
 namespace {
 
 /// The book gives no numbers: a traction motor for 240 V and 40 A.
@@ -81,7 +81,7 @@ TEST(SeriesDcMachine, AStraightCurveOrAnOpenSwitchChangesNothing) {
   SeriesDcMachineParameters straight = kSeries;
   straight.field_inductance_h = 0.0;
   straight.saturation_curve = Curve({{0.0, 0.0}, {10.0, 0.5}, {20.0, 1.0}});
-  const RigLoad load{.inertia_kgm2 = 0.5, .load_nm = 20.0};
+  const ShaftLoad load{.inertia_kgm2 = 0.5, .load_nm = 20.0};
   Rig<SeriesDcMachineState> simple;
   run(simple, 2.0, kStep_s, constants_of(kSeries), voltage(240.0), load);
   EXPECT_GT(simple.shaft.speed_rad_s, 50.0);
@@ -115,7 +115,7 @@ TEST(SeriesDcMachine, SteadyTorqueFollowsTheSpeedAsInTheReferenceWhateverTheSign
 // holds back a little.
 TEST(SeriesDcMachine, RunsAwayWithoutALoad) {
   const SeriesDcMachineConstants c = constants_of(kSeries);
-  const RigLoad nothing{.inertia_kgm2 = 0.5};
+  const ShaftLoad nothing{.inertia_kgm2 = 0.5};
   Rig<SeriesDcMachineState> rig;
   run(rig, 100.0, kStep_s, c, voltage(240.0), nothing);
   const double after_100_s = rig.shaft.speed_rad_s;
@@ -197,7 +197,7 @@ TEST(SeriesDcMachine, OpeningTheSwitchKeepsTheLinkageAndBurnsTheRestAndClosingIt
 TEST(SeriesDcMachine, EnergyIsAccountedForWhileTheSwitchMoves) {
   const SeriesDcMachineConstants open = constants_of(divided(saturated(kSeries), false));
   const SeriesDcMachineConstants closed = constants_of(divided(saturated(kSeries), true));
-  const RigLoad load{.inertia_kgm2 = 2.0, .friction_nms = 0.3};
+  const ShaftLoad load{.inertia_kgm2 = 2.0, .friction_nms = 0.3};
   Rig<SeriesDcMachineState> rig;
   double burnt_j = 0.0;
   for (int n = 0; n < 3; ++n) {
@@ -262,4 +262,4 @@ TEST(SeriesDcMachine, AdjustsEachWindingByItsFactorAndBoundsItsFastestTimeConsta
 }
 
 }  // namespace
-}  // namespace drivebench
+}  // namespace drivebench::series_dc_machine_test

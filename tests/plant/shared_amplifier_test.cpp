@@ -6,7 +6,7 @@
 #include "plant/math/rk4.hpp"
 #include "tests/plant/servo_axis.hpp"
 
-namespace drivebench {
+namespace drivebench::shared_amplifier_test {
 namespace {
 
 constexpr AxisTiming kTiming{.period_s = 1e-4, .substeps = 4};
@@ -236,4 +236,4 @@ TEST(SharedAmplifier, BothHoldWhereOneDiverges) {
 }
 
 }  // namespace
-}  // namespace drivebench
+}  // namespace drivebench::shared_amplifier_test

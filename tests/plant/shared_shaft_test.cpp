@@ -5,7 +5,7 @@
 #include "plant/axis.hpp"
 #include "plant/math/rk4.hpp"
 
-namespace drivebench {
+namespace drivebench::shared_shaft_test {
 namespace {
 
 constexpr AxisTiming kTiming{.period_s = 1e-4, .substeps = 4};
@@ -276,4 +276,4 @@ TEST(SharedShaft, IfOneAxisDivergesBothAreHeld) {
 }
 
 }  // namespace
-}  // namespace drivebench
+}  // namespace drivebench::shared_shaft_test

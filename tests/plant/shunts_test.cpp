@@ -9,7 +9,7 @@
 #include "plant/parameters/parameters.hpp"
 #include "tests/plant/bridge_rig.hpp"
 
-namespace drivebench {
+namespace drivebench::shunts_test {
 namespace {
 
 using namespace bridge_rig;
@@ -223,4 +223,4 @@ TEST(Shunts, TheRulesNameTheFieldAndTheReason) {
 }
 
 }  // namespace
-}  // namespace drivebench
+}  // namespace drivebench::shunts_test

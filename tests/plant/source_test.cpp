@@ -11,7 +11,7 @@
 
 #include "tests/plant/drive_rig.hpp"
 
-namespace drivebench {
+namespace drivebench::source_test {
 namespace {
 
 constexpr double kPi = std::numbers::pi;
@@ -395,4 +395,4 @@ TEST(Source, TheStartSwitchShortsPhaseB) {
 }
 
 }  // namespace
-}  // namespace drivebench
+}  // namespace drivebench::source_test

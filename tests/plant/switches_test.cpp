@@ -9,7 +9,7 @@
 #include "tests/plant/bridge_rig.hpp"
 #include "tests/plant/servo_axis.hpp"
 
-namespace drivebench {
+namespace drivebench::switches_test {
 namespace {
 
 using namespace bridge_rig;
@@ -281,4 +281,4 @@ TEST(Switches, TheRulesNameTheKindOfDrive) {
 }
 
 }  // namespace
-}  // namespace drivebench
+}  // namespace drivebench::switches_test

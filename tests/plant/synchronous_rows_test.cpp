@@ -5,7 +5,7 @@
 
 #include "plant/parameters/machine_kind.hpp"
 
-namespace drivebench {
+namespace drivebench::synchronous_rows_test {
 namespace {
 
 /// A value for each row that no other row has, written through the table and read back.
@@ -58,4 +58,4 @@ TEST(SynchronousRows, TheFieldCannotLinkMoreThanAllOfTheStatorFlux) {
 }
 
 }  // namespace
-}  // namespace drivebench
+}  // namespace drivebench::synchronous_rows_test

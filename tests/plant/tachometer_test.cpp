@@ -6,7 +6,7 @@
 #include <cmath>
 #include <numbers>
 
-namespace drivebench {
+namespace drivebench::tachometer_test {
 namespace {
 
 constexpr TachometerParameters kTachometer{.gain_vs_per_rad = 0.03, .ripple = 0.05, .ripple_per_turn = 22};
@@ -43,4 +43,4 @@ TEST(Tachometer, TheRippleHasItsAmplitudeItsPeriodAndNoMean) {
 }
 
 }  // namespace
-}  // namespace drivebench
+}  // namespace drivebench::tachometer_test

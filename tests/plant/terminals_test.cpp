@@ -4,7 +4,7 @@
 
 #include <cmath>
 
-namespace drivebench {
+namespace drivebench::terminals_test {
 namespace {
 
 constexpr double kRail_v = 100.0;
@@ -152,4 +152,4 @@ TEST(Terminals, EachBridgeOfItsOwnFloatsByItself) {
 }
 
 }  // namespace
-}  // namespace drivebench
+}  // namespace drivebench::terminals_test

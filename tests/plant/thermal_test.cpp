@@ -4,7 +4,7 @@
 
 #include <cmath>
 
-namespace drivebench {
+namespace drivebench::thermal_test {
 namespace {
 
 constexpr ThermalParameters kMotor{
@@ -59,4 +59,4 @@ TEST(Thermal, ResistancesGrowFromTheReferenceTemperature) {
 }
 
 }  // namespace
-}  // namespace drivebench
+}  // namespace drivebench::thermal_test

@@ -13,7 +13,7 @@
 #include "tests/plant/induction_motors.hpp"
 #include "tests/plant/power_balance.hpp"
 
-namespace drivebench {
+namespace drivebench::three_phase_induction_test {
 namespace {
 
 using namespace induction_motors;
@@ -275,4 +275,4 @@ TEST(ThreePhaseInduction, ThePowerOfThePhasesIsStoredLostOrDelivered) {
 }
 
 }  // namespace
-}  // namespace drivebench
+}  // namespace drivebench::three_phase_induction_test

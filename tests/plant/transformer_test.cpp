@@ -10,7 +10,7 @@
 #include "plant/axis.hpp"
 #include "tests/plant/drive_rig.hpp"
 
-namespace drivebench {
+namespace drivebench::transformer_test {
 namespace {
 
 using Complex = std::complex<double>;
@@ -259,4 +259,4 @@ TEST(Transformer, SubstepsSeeTheFastestTimeConstant) {
 }
 
 }  // namespace
-}  // namespace drivebench
+}  // namespace drivebench::transformer_test

@@ -9,7 +9,7 @@
 #include <limits>
 #include <random>
 
-namespace drivebench {
+namespace drivebench::trig_test {
 namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
@@ -227,4 +227,4 @@ TEST(Trig, AHashOfManyResultsIsTheSameOnEveryMachine) {
 }
 
 }  // namespace
-}  // namespace drivebench
+}  // namespace drivebench::trig_test

@@ -9,7 +9,7 @@
 #include "tests/plant/bridge_rig.hpp"
 #include "tests/plant/servo_axis.hpp"
 
-namespace drivebench {
+namespace drivebench::turn_on_test {
 namespace {
 
 using namespace bridge_rig;
@@ -231,4 +231,4 @@ TEST(TurnOn, CurrentsGoTheWayOfTheirDiodes) {
 }
 
 }  // namespace
-}  // namespace drivebench
+}  // namespace drivebench::turn_on_test

@@ -10,7 +10,7 @@
 #include "plant/mechanics/shaft.hpp"
 #include "tests/plant/shaft_run.hpp"
 
-namespace drivebench {
+namespace drivebench::two_mass_test {
 namespace {
 
 using ElasticRun = ShaftRun<TwoMassState>;
@@ -333,4 +333,4 @@ TEST(TwoMass, PressedTogetherTheTeethComeToRestAgainstEachOther) {
 }
 
 }  // namespace
-}  // namespace drivebench
+}  // namespace drivebench::two_mass_test

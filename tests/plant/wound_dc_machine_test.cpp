@@ -9,7 +9,7 @@
 #include "tests/plant/dc_rig.hpp"
 
 /// Separately excited and shunt machine. The book gives no numbers: 240 V, 160 rad/s, 10 kW.
-namespace drivebench {
+namespace drivebench::wound_dc_machine_test {
 namespace {
 
 const SeparateDcMachineParameters kSeparate{.armature_resistance_ohm = 0.5,
@@ -23,7 +23,7 @@ const ShuntDcMachineParameters kShunt{.armature_resistance_ohm = 0.5,
                                       .field_resistance_ohm = 80.0,
                                       .adjusting_resistance_ohm = 20.0,
                                       .field_inductance_h = 20.0};
-constexpr RigLoad kShaft{.inertia_kgm2 = 0.2, .friction_nms = 0.01};
+constexpr ShaftLoad kShaft{.inertia_kgm2 = 0.2, .friction_nms = 0.01};
 
 template <class Parameters>
 Parameters saturated(Parameters p) {
@@ -133,7 +133,7 @@ TEST(SeparateDcMachine, RunsAtTheSpeedOfItsVoltageOverItsFlux) {
     const SeparateDcMachineConstants c = constants_of(p);
     const double flux_wb = p.saturation_curve.empty() ? 2.0 * 20.0 : p.saturation_curve.value(2.0);
     Rig<SeparateDcMachineState> rig;
-    const RigLoad frictionless{.inertia_kgm2 = 0.2};
+    const ShaftLoad frictionless{.inertia_kgm2 = 0.2};
     run(rig, 20.0, 1e-4, c, voltage(240.0, 200.0), frictionless);
     EXPECT_NEAR(rig.machine.field_flux_wb, flux_wb, 1e-9 * flux_wb);
     EXPECT_NEAR(rig.shaft.speed_rad_s, 240.0 / (0.03 * flux_wb), 1e-6);
@@ -150,7 +150,7 @@ TEST(SeparateDcMachine, RunsAtTheSpeedOfItsVoltageOverItsFlux) {
 // an emf that does not follow it.
 TEST(SeparateDcMachine, RunsAwayWhenItLosesItsField) {
   const SeparateDcMachineConstants c = constants_of(kSeparate);
-  const RigLoad frictionless{.inertia_kgm2 = 0.2};
+  const ShaftLoad frictionless{.inertia_kgm2 = 0.2};
   Rig<SeparateDcMachineState> rig;
   run(rig, 10.0, 1e-4, c, voltage(240.0, 200.0), frictionless);
   EXPECT_NEAR(rig.shaft.speed_rad_s, 200.0, 0.01);
@@ -366,4 +366,4 @@ TEST(ShuntDcMachine, AdjustsEachWindingByItsFactor) {
 }
 
 }  // namespace
-}  // namespace drivebench
+}  // namespace drivebench::wound_dc_machine_test

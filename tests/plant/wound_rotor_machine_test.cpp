@@ -7,7 +7,7 @@
 
 #include "tests/plant/power_balance.hpp"
 
-namespace drivebench {
+namespace drivebench::wound_rotor_machine_test {
 namespace {
 
 constexpr WoundRotorMachineParameters kMachine{.pole_pairs = 2,
@@ -245,4 +245,4 @@ TEST(WoundRotorMachine, HeatAndSeriesImpedanceChangeTheirOwnParameters) {
 }
 
 }  // namespace
-}  // namespace drivebench
+}  // namespace drivebench::wound_rotor_machine_test

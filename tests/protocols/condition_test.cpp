@@ -9,7 +9,7 @@
 
 #include "protocols/signals/catalogue.hpp"
 
-namespace drivebench {
+namespace drivebench::condition_test {
 namespace {
 
 Condition condition(const std::string& text) {
@@ -96,4 +96,4 @@ TEST(Condition, AWrongTextIsRefusedInWords) {
 }
 
 }  // namespace
-}  // namespace drivebench
+}  // namespace drivebench::condition_test

@@ -8,7 +8,7 @@
 #include "bench.pb.h"
 #include "protocols/text.hpp"
 
-namespace drivebench {
+namespace drivebench::document_test {
 namespace {
 
 // Catches: a character that is cut in two; one that fits and is left out.
@@ -66,4 +66,4 @@ TEST(Document, APrintedTextIsOneLine) {
 }
 
 }  // namespace
-}  // namespace drivebench
+}  // namespace drivebench::document_test

@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-namespace drivebench {
+namespace drivebench::framing_test {
 namespace {
 
 using Bytes = std::vector<std::byte>;
@@ -177,4 +177,4 @@ TEST(Framing, LongStreamsInRandomPiecesComeOutWhole) {
 }
 
 }  // namespace
-}  // namespace drivebench
+}  // namespace drivebench::framing_test

@@ -7,7 +7,7 @@
 #include <string_view>
 #include <vector>
 
-namespace drivebench {
+namespace drivebench::nearest_name_test {
 namespace {
 
 constexpr std::array<std::string_view, 4> kKnown = {"period_us", "channel", "stator_inductance_h",
@@ -55,4 +55,4 @@ TEST(NearestName, AdviceSuggestsOneNameOrListsAll) {
 }
 
 }  // namespace
-}  // namespace drivebench
+}  // namespace drivebench::nearest_name_test

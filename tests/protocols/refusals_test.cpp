@@ -7,7 +7,7 @@
 
 #include "bench.pb.h"
 
-namespace drivebench {
+namespace drivebench::refusals_test {
 namespace {
 
 struct Codes {
@@ -115,4 +115,4 @@ TEST(Refusals, TheListsOfCodesComeFromTheTable) {
 }
 
 }  // namespace
-}  // namespace drivebench
+}  // namespace drivebench::refusals_test

@@ -14,7 +14,7 @@
 #include "protocols/framing.hpp"
 #include "protocols/wire.hpp"
 
-namespace drivebench {
+namespace drivebench::sample_codec_test {
 namespace {
 
 using google::protobuf::FieldDescriptor;
@@ -281,4 +281,4 @@ TEST(Wire, VarintsAndZigzagRoundTrip) {
 }
 
 }  // namespace
-}  // namespace drivebench
+}  // namespace drivebench::sample_codec_test

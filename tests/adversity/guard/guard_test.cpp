@@ -25,7 +25,7 @@
 #include "tests/adversity/guard/guarded.hpp"
 #include "tests/server/recording/run_config.hpp"
 
-namespace drivebench {
+namespace drivebench::guard_test {
 namespace {
 
 constexpr Tick kTicks = 1'000'000;
@@ -330,4 +330,4 @@ TEST(TickGuard, RT_02_AMillionTicksTouchNoNewMemory) {
 }
 
 }  // namespace
-}  // namespace drivebench
+}  // namespace drivebench::guard_test

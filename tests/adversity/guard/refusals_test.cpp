@@ -8,7 +8,7 @@
 #include "plant/parameters/parameters.hpp"
 #include "tests/adversity/guard/guarded.hpp"
 
-namespace drivebench {
+namespace drivebench::refusals_test {
 namespace {
 
 /// Submits writes, ramps and faults that break a rule to the second axis of busy_bench(), whose dry friction
@@ -74,4 +74,4 @@ TEST(TickGuard, RT_01_NoRuleOfAnyBenchAllocatesInATick) {
 }
 
 }  // namespace
-}  // namespace drivebench
+}  // namespace drivebench::refusals_test

@@ -7,7 +7,7 @@
 
 #include "tests/benchmark/harness/report.hpp"
 
-namespace drivebench::speed {
+namespace drivebench::speed::compare_test {
 namespace {
 
 constexpr const char* kHere = "A CPU, 2 CPUs";
@@ -66,4 +66,4 @@ TEST(BenchmarkCompare, WhatCannotBeComparedIsTold) {
 }
 
 }  // namespace
-}  // namespace drivebench::speed
+}  // namespace drivebench::speed::compare_test

@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace drivebench::speed {
+namespace drivebench::speed::report_test {
 namespace {
 
 Row tick() {
@@ -47,4 +47,4 @@ TEST(BenchmarkReport, MarkdownMarksFiguresOverTheirLimitNotJudgedAndSkipped) {
 }
 
 }  // namespace
-}  // namespace drivebench::speed
+}  // namespace drivebench::speed::report_test

@@ -12,7 +12,7 @@
 #include "clients/control/dc/dc_open_loop.hpp"
 #include "tests/book/closed_loop.hpp"
 
-namespace drivebench {
+namespace drivebench::control_dc_test {
 namespace {
 
 using Complex = std::complex<double>;
@@ -392,4 +392,4 @@ TEST(DcControl, ASineIsFollowedByALoopThatContainsIt) {
 }
 
 }  // namespace
-}  // namespace drivebench
+}  // namespace drivebench::control_dc_test

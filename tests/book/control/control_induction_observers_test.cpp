@@ -15,7 +15,7 @@
 #include "tests/book/closed_loop.hpp"
 #include "tests/clients/control/induction/servo_motor.hpp"
 
-namespace drivebench {
+namespace drivebench::control_induction_observers_test {
 namespace {
 
 using control::kServoMotor;
@@ -317,4 +317,4 @@ TEST(InductionObservers, TheRotorFrameObserverTellsTheServoItsLoad) {
 }
 
 }  // namespace
-}  // namespace drivebench
+}  // namespace drivebench::control_induction_observers_test

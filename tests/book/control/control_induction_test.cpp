@@ -15,7 +15,7 @@
 
 #include "tests/book/closed_loop.hpp"
 
-namespace drivebench {
+namespace drivebench::control_induction_test {
 namespace {
 
 /// Samples from the start of the trajectory on in which the law was not applied.
@@ -228,4 +228,4 @@ TEST(InductionControl, AlongTheFlatOutputsTheSlipIsConstant) {
 }
 
 }  // namespace
-}  // namespace drivebench
+}  // namespace drivebench::control_induction_test

@@ -9,7 +9,7 @@
 #include "clients/control/salient/least_current.hpp"
 #include "tests/book/closed_loop.hpp"
 
-namespace drivebench {
+namespace drivebench::control_salient_test {
 namespace {
 
 constexpr SalientPmModel kIpm = {.pole_pairs = 4.0,
@@ -86,4 +86,4 @@ TEST(SalientControl, TheDetentTorqueLeavesTheErrorOfTheGains) {
 }
 
 }  // namespace
-}  // namespace drivebench
+}  // namespace drivebench::control_salient_test

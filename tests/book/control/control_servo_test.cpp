@@ -9,7 +9,7 @@
 
 #include "tests/book/closed_loop.hpp"
 
-namespace drivebench {
+namespace drivebench::control_servo_test {
 namespace {
 
 // Case 4. Catches: a wrong sign, gain or frame anywhere between the preset and the plant. The table has 1.49
@@ -129,4 +129,4 @@ TEST(ServoControl, NestedLoopsKeepTheirSpeedLimit) {
 }
 
 }  // namespace
-}  // namespace drivebench
+}  // namespace drivebench::control_servo_test

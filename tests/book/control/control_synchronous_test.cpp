@@ -12,7 +12,7 @@
 
 #include "tests/book/closed_loop.hpp"
 
-namespace drivebench {
+namespace drivebench::control_synchronous_test {
 namespace {
 
 constexpr double kStep_rad = std::numbers::pi / 100.0;  // 1.8 degrees
@@ -339,4 +339,4 @@ TEST(WoundRotorControl, FieldWeakeningReaches350RadiansPerSecond) {
 }
 
 }  // namespace
-}  // namespace drivebench
+}  // namespace drivebench::control_synchronous_test

@@ -8,7 +8,7 @@
 
 #include "tests/book/closed_loop.hpp"
 
-namespace drivebench {
+namespace drivebench::control_wound_dc_test {
 namespace {
 
 using control::Gain;
@@ -140,4 +140,4 @@ TEST(WoundDcControl, AMoveBeyondTheLimitsIsRefused) {
 }
 
 }  // namespace
-}  // namespace drivebench
+}  // namespace drivebench::control_wound_dc_test

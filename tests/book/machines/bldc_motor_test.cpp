@@ -7,7 +7,7 @@
 
 #include "tests/book/book_bench.hpp"
 
-namespace drivebench {
+namespace drivebench::bldc_motor_test {
 namespace {
 
 BenchConfig bldc_config() {
@@ -176,4 +176,4 @@ TEST(BookBldcMotor, TheMoveNeedsMoreThan200Volts) {
 }
 
 }  // namespace
-}  // namespace drivebench
+}  // namespace drivebench::bldc_motor_test

@@ -7,7 +7,7 @@
 
 #include "tests/book/book_bench.hpp"
 
-namespace drivebench {
+namespace drivebench::current_loop_test {
 namespace {
 
 using Complex = std::complex<double>;
@@ -135,4 +135,4 @@ TEST(BookCurrentLoop, TheMotorOf914CannotFollowTheStepper) {
 }
 
 }  // namespace
-}  // namespace drivebench
+}  // namespace drivebench::current_loop_test

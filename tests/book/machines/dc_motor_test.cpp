@@ -5,7 +5,7 @@
 
 #include "tests/book/book_bench.hpp"
 
-namespace drivebench {
+namespace drivebench::dc_motor_test {
 namespace {
 
 // AC-01, the bench dc-a: 10 V from rest. The closed form is the matrix exponential of the book's equations;
@@ -122,4 +122,4 @@ TEST(BookDcMotor, TheOtherDcBenchesComeToTheirSpeeds) {
 }
 
 }  // namespace
-}  // namespace drivebench
+}  // namespace drivebench::dc_motor_test

@@ -9,7 +9,7 @@
 #include "tests/book/book_bench.hpp"
 #include "tests/book/machines/steady_induction.hpp"
 
-namespace drivebench {
+namespace drivebench::dynamometer_test {
 namespace {
 
 constexpr double kLine_rad_s = 2.0 * std::numbers::pi * 60.0;
@@ -128,4 +128,4 @@ TEST(BookDynamometer, TheEnergyOfBothDrivesIsLostOrStored) {
 }
 
 }  // namespace
-}  // namespace drivebench
+}  // namespace drivebench::dynamometer_test

@@ -9,7 +9,7 @@
 #include "tests/book/machines/steady_induction.hpp"
 #include "tests/plant/servo_axis.hpp"
 
-namespace drivebench {
+namespace drivebench::induction_limits_test {
 namespace {
 
 using Complex = std::complex<double>;
@@ -113,4 +113,4 @@ TEST(BookInductionLimits, TheFluxObserversErrAsInTheReference) {
 }
 
 }  // namespace
-}  // namespace drivebench
+}  // namespace drivebench::induction_limits_test

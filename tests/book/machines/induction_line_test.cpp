@@ -6,7 +6,7 @@
 
 #include "tests/book/book_bench.hpp"
 
-namespace drivebench {
+namespace drivebench::induction_line_test {
 namespace {
 
 constexpr double kLine_rad_s = 2.0 * std::numbers::pi * 60.0;
@@ -231,4 +231,4 @@ TEST(BookInductionLine, TheMotorsOfTheIdentificationStartAsInTheBook) {
 }
 
 }  // namespace
-}  // namespace drivebench
+}  // namespace drivebench::induction_line_test

@@ -12,7 +12,7 @@
 #include "server/config/config.hpp"
 #include "tests/plant/servo_axis.hpp"
 
-namespace drivebench {
+namespace drivebench::induction_model_test {
 namespace {
 
 // Ticks of one integration step, so that the held voltage is as close to the sine as the reference.
@@ -105,4 +105,4 @@ TEST(BookInductionModel, MachinesWithScaledRotorsAreIndistinguishableAtTheTermin
 }
 
 }  // namespace
-}  // namespace drivebench
+}  // namespace drivebench::induction_model_test

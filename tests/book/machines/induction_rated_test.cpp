@@ -8,7 +8,7 @@
 #include "tests/book/book_bench.hpp"
 #include "tests/book/machines/steady_induction.hpp"
 
-namespace drivebench {
+namespace drivebench::induction_rated_test {
 namespace {
 
 using Complex = std::complex<double>;
@@ -149,4 +149,4 @@ TEST(BookInductionRated, TheShippedMotorsHaveTheLeakageOfTheReference) {
 }
 
 }  // namespace
-}  // namespace drivebench
+}  // namespace drivebench::induction_rated_test

@@ -8,7 +8,7 @@
 
 #include "tests/book/book_bench.hpp"
 
-namespace drivebench {
+namespace drivebench::inverter_benches_test {
 namespace {
 
 constexpr double kTwoPi = 2.0 * std::numbers::pi;
@@ -204,4 +204,4 @@ TEST(BookInverterBenches, TheBldcRunsAtItsDuty) {
 }
 
 }  // namespace
-}  // namespace drivebench
+}  // namespace drivebench::inverter_benches_test

@@ -6,7 +6,7 @@
 
 #include "tests/book/book_bench.hpp"
 
-namespace drivebench {
+namespace drivebench::pm_limits_test {
 namespace {
 
 constexpr double kVoltage_v = 124.75;  // sqrt(3/2) (2/pi) 160
@@ -134,4 +134,4 @@ TEST(BookPmLimits, TheLargestTorquesOfTheBm500AreThoseOfTheReference) {
 }
 
 }  // namespace
-}  // namespace drivebench
+}  // namespace drivebench::pm_limits_test

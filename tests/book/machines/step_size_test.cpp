@@ -16,7 +16,7 @@
 
 /// The error of the plant's steps against an adaptive method of order eight with a tolerance of 1e-13, which
 /// is Boost's and independent of the drive train. Its output is the table in plant/README.md.
-namespace drivebench {
+namespace drivebench::step_size_test {
 namespace {
 
 /// A motor on a sinusoidal (or DC) source from rest.
@@ -345,4 +345,4 @@ TEST(StepSize, AFilteredAmplifierIsExactAtItsDefaultSubstep) {
 }
 
 }  // namespace
-}  // namespace drivebench
+}  // namespace drivebench::step_size_test

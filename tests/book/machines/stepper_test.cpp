@@ -6,7 +6,7 @@
 
 #include "tests/book/book_bench.hpp"
 
-namespace drivebench {
+namespace drivebench::stepper_test {
 namespace {
 
 constexpr double kDegree_rad = std::numbers::pi / 180.0;
@@ -113,4 +113,4 @@ TEST(BookStepper, TheSourceOfTheBenchStepsTheMotor) {
 }
 
 }  // namespace
-}  // namespace drivebench
+}  // namespace drivebench::stepper_test

@@ -8,7 +8,7 @@
 
 #include "tests/book/book_bench.hpp"
 
-namespace drivebench {
+namespace drivebench::synchronous_benches_test {
 namespace {
 
 using Complex = std::complex<double>;
@@ -151,4 +151,4 @@ TEST(BookSynchronousBenches, TheWoundRotorOnTheLineFollowsItsPhasorDiagram) {
 }
 
 }  // namespace
-}  // namespace drivebench
+}  // namespace drivebench::synchronous_benches_test

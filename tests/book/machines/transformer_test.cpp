@@ -8,7 +8,7 @@
 #include "tests/book/machines/transformer_circuit.hpp"
 #include "tests/clients/identification/bench_data.hpp"
 
-namespace drivebench {
+namespace drivebench::transformer_test {
 namespace {
 
 using Complex = std::complex<double>;
@@ -93,4 +93,4 @@ TEST(BookTransformer, ASavedStateGoesOnBitForBit) {
 }
 
 }  // namespace
-}  // namespace drivebench
+}  // namespace drivebench::transformer_test

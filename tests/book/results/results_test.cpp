@@ -5,7 +5,7 @@
 #include <fstream>
 #include <sstream>
 
-namespace drivebench {
+namespace drivebench::results_test {
 namespace {
 
 // Catches: a controller, a preset or a plant that has changed without the table, and a table written by hand.
@@ -42,4 +42,4 @@ TEST(Results, DifferencesAreFound) {
 }
 
 }  // namespace
-}  // namespace drivebench
+}  // namespace drivebench::results_test

@@ -6,7 +6,7 @@
 
 #include "clients/archive/zip_reader.hpp"
 
-namespace drivebench::archive {
+namespace drivebench::archive::zip_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -88,4 +88,4 @@ TEST_F(ZipFile, RefusesWhatIsNotWhole) {
 }
 
 }  // namespace
-}  // namespace drivebench::archive
+}  // namespace drivebench::archive::zip_test

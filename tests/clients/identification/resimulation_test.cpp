@@ -9,7 +9,7 @@
 #include "clients/identification/motors/motors.hpp"
 #include "tests/clients/identification/bench_data.hpp"
 
-namespace drivebench::identification {
+namespace drivebench::identification::resimulation_test {
 namespace {
 
 constexpr double kPi = std::numbers::pi;
@@ -192,4 +192,4 @@ TEST(Resimulation, ImpossibleParametersAreRefused) {
 }
 
 }  // namespace
-}  // namespace drivebench::identification
+}  // namespace drivebench::identification::resimulation_test

@@ -7,7 +7,7 @@
 
 #include "tests/clients/identification/bench_data.hpp"
 
-namespace drivebench {
+namespace drivebench::induction_circuit_test {
 namespace {
 
 using Mode = InductionCircuit::Mode;
@@ -162,4 +162,4 @@ TEST(InductionCircuit, AgreesWithTheBenchBehindALine) {
 }
 
 }  // namespace
-}  // namespace drivebench
+}  // namespace drivebench::induction_circuit_test

@@ -9,7 +9,7 @@
 
 #include "plant/axis.hpp"
 
-namespace drivebench {
+namespace drivebench::induction_forms_test {
 namespace {
 
 /// The 208 V motor of the book's problem 7.18 (IM-B).
@@ -106,4 +106,4 @@ TEST(InductionForms, AMotorStartsAlikeInEveryForm) {
 }
 
 }  // namespace
-}  // namespace drivebench
+}  // namespace drivebench::induction_forms_test

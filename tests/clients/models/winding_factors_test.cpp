@@ -6,7 +6,7 @@
 #include <numbers>
 #include <vector>
 
-namespace drivebench {
+namespace drivebench::winding_factors_test {
 namespace {
 
 constexpr double kDegree = std::numbers::pi / 180.0;
@@ -43,4 +43,4 @@ TEST(WindingFactors, HarmonicsFollowTheirAngles) {
 }
 
 }  // namespace
-}  // namespace drivebench
+}  // namespace drivebench::winding_factors_test

@@ -4,7 +4,7 @@
 
 #include <vector>
 
-namespace drivebench::reference {
+namespace drivebench::reference::preset_fit_test {
 namespace {
 
 // Catches: a preset that is run on a bench it was not made for.
@@ -53,4 +53,4 @@ TEST(Mismatches, GainsThatDescribeTheAxisChangeTheRequirements) {
 }
 
 }  // namespace
-}  // namespace drivebench::reference
+}  // namespace drivebench::reference::preset_fit_test

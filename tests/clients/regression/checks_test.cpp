@@ -10,7 +10,7 @@
 
 #include "tests/clients/regression/check_on_course.hpp"
 
-namespace drivebench::regression {
+namespace drivebench::regression::checks_test {
 namespace {
 
 /// From 0 to 10 within the ticks 10 to 20, at 12 from 21 to 30, then 10.
@@ -260,4 +260,4 @@ TEST(Checks, MistakesAreRefusedWithKeyAndRule) {
 }
 
 }  // namespace
-}  // namespace drivebench::regression
+}  // namespace drivebench::regression::checks_test

@@ -9,7 +9,7 @@
 #include "clients/regression/tables/key_table.hpp"
 #include "tests/clients/regression/suite_folder.hpp"
 
-namespace drivebench::regression {
+namespace drivebench::regression::compose_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -218,4 +218,4 @@ TEST_F(Compose, StepsOnAConditionWaitInTheBench) {
 }
 
 }  // namespace
-}  // namespace drivebench::regression
+}  // namespace drivebench::regression::compose_test

@@ -8,7 +8,7 @@
 
 #include "tests/clients/regression/check_on_course.hpp"
 
-namespace drivebench::regression {
+namespace drivebench::regression::formula_test {
 namespace {
 
 /// Its unit, or the reason why it is none.
@@ -141,4 +141,4 @@ TEST(Formula, StandsInThePlaceOfASignal) {
 }
 
 }  // namespace
-}  // namespace drivebench::regression
+}  // namespace drivebench::regression::formula_test

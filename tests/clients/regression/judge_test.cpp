@@ -11,7 +11,7 @@
 #include "clients/regression/reports/reports.hpp"
 #include "tests/clients/regression/report_text.hpp"
 
-namespace drivebench::regression {
+namespace drivebench::regression::judge_test {
 namespace {
 
 Case case_with(double largest_speed) {
@@ -233,4 +233,4 @@ TEST(Reports, TheTableShowsTheEndOfTheOutput) {
 }
 
 }  // namespace
-}  // namespace drivebench::regression
+}  // namespace drivebench::regression::judge_test

@@ -17,7 +17,7 @@
 
 // Loops whose gain is known in closed form, around the motor of problem 2.1 of the book, on the product's
 // bench.
-namespace drivebench::regression {
+namespace drivebench::regression::response_test {
 namespace {
 
 using Complex = std::complex<double>;
@@ -320,4 +320,4 @@ TEST(FrequencyResponse, NeedsBoundsThatFitTogether) {
 }
 
 }  // namespace
-}  // namespace drivebench::regression
+}  // namespace drivebench::regression::response_test

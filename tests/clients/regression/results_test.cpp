@@ -12,7 +12,7 @@
 #include "clients/regression/results/shard.hpp"
 #include "tests/clients/regression/report_text.hpp"
 
-namespace drivebench::regression {
+namespace drivebench::regression::results_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -178,4 +178,4 @@ TEST_F(Results, AFingerprintKnowsWhatARunDependsOn) {
 }
 
 }  // namespace
-}  // namespace drivebench::regression
+}  // namespace drivebench::regression::results_test

@@ -7,7 +7,7 @@
 #include "clients/regression/tables/key_table.hpp"
 #include "clients/regression/tables/toml_text.hpp"
 
-namespace drivebench::regression {
+namespace drivebench::regression::shrink_test {
 namespace {
 
 constexpr const char* kCase = R"(
@@ -188,4 +188,4 @@ TEST(Shrink, WhatCannotBecomeSmallerStays) {
 }
 
 }  // namespace
-}  // namespace drivebench::regression
+}  // namespace drivebench::regression::shrink_test

@@ -7,7 +7,7 @@
 #include "clients/regression/checks/harmonics.hpp"
 #include "tests/clients/regression/check_on_course.hpp"
 
-namespace drivebench::regression {
+namespace drivebench::regression::spectrum_test {
 namespace {
 
 /// A square wave as the sum of its harmonics up to one, so that none is folded back by the samples; on a
@@ -121,4 +121,4 @@ TEST(Checks, ThdThatCannotBeIsRefusedBeforeTheRun) {
 }
 
 }  // namespace
-}  // namespace drivebench::regression
+}  // namespace drivebench::regression::spectrum_test

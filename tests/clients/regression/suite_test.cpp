@@ -9,7 +9,7 @@
 #include "clients/regression/tables/toml_text.hpp"
 #include "tests/clients/regression/suite_folder.hpp"
 
-namespace drivebench::regression {
+namespace drivebench::regression::suite_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -205,4 +205,4 @@ TEST(TomlText, ReadsBackAsItWas) {
 }
 
 }  // namespace
-}  // namespace drivebench::regression
+}  // namespace drivebench::regression::suite_test

@@ -10,7 +10,7 @@
 #include "clients/regression/timing/timing_report.hpp"
 #include "protocols/json.hpp"
 
-namespace drivebench::regression {
+namespace drivebench::regression::timing_test {
 namespace {
 
 using enum DeviceTiming::Way;
@@ -146,4 +146,4 @@ TEST(TimingReport, APageOfManyCasesStaysSmall) {
 }
 
 }  // namespace
-}  // namespace drivebench::regression
+}  // namespace drivebench::regression::timing_test

@@ -8,7 +8,7 @@
 
 #include "tests/clients/sdk/bridge_handle.hpp"
 
-namespace drivebench::client {
+namespace drivebench::client::bridge_state_test {
 namespace {
 
 constexpr std::uint64_t kMilli = 1000 * kMicro;
@@ -171,4 +171,4 @@ TEST(BridgeState, AMachineDivergesWhenItDoesAndNotWhenItIsLookedAt) {
 }
 
 }  // namespace
-}  // namespace drivebench::client
+}  // namespace drivebench::client::bridge_state_test

@@ -13,7 +13,7 @@
 
 #include "tests/clients/sdk/bridge_handle.hpp"
 
-namespace drivebench::client {
+namespace drivebench::client::bridge_test {
 namespace {
 
 // Catches: bad input that is taken, ends the program or is refused without a word; a refusal that changes the
@@ -299,4 +299,4 @@ TEST(Bridge, RefusesAParameterThatCannotBe) {
 }
 
 }  // namespace
-}  // namespace drivebench::client
+}  // namespace drivebench::client::bridge_test

@@ -4,7 +4,7 @@
 
 #include <string>
 
-namespace drivebench::web {
+namespace drivebench::web::door_test {
 namespace {
 
 Door local_door() {
@@ -108,4 +108,4 @@ TEST(ListenAddress, ReadsEveryFormAndRefusesTheRest) {
 }
 
 }  // namespace
-}  // namespace drivebench::web
+}  // namespace drivebench::web::door_test

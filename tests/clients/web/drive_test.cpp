@@ -9,7 +9,7 @@
 
 #include "protocols/framing.hpp"
 
-namespace drivebench::web {
+namespace drivebench::web::drive_test {
 namespace {
 
 using namespace std::chrono_literals;
@@ -397,4 +397,4 @@ TEST(OpenLoop, AStartAfterGatesOffBeginsAtRest) {
 }
 
 }  // namespace
-}  // namespace drivebench::web
+}  // namespace drivebench::web::drive_test

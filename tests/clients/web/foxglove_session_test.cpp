@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-namespace drivebench::web {
+namespace drivebench::web::foxglove_session_test {
 namespace {
 
 v1::Welcome welcome_with_axes(int count) {
@@ -119,4 +119,4 @@ TEST(FoxgloveSession, WEB_06_AnswersThatNobodyTakesHaveALimit) {
 }
 
 }  // namespace
-}  // namespace drivebench::web
+}  // namespace drivebench::web::foxglove_session_test

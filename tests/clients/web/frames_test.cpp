@@ -7,7 +7,7 @@
 
 #include "protocols/framing.hpp"
 
-namespace drivebench::web {
+namespace drivebench::web::frames_test {
 namespace {
 
 std::string problem_of(const std::vector<int>& bytes) {
@@ -41,4 +41,4 @@ TEST(Frames, WEB_03_AFrameMayBeAsLongAsARequest) {
 }
 
 }  // namespace
-}  // namespace drivebench::web
+}  // namespace drivebench::web::frames_test

@@ -10,7 +10,7 @@
 #include "clients/reference/preset_fit.hpp"
 #include "clients/web/gateway/drive/orders.hpp"
 
-namespace drivebench::web {
+namespace drivebench::web::reference_run_test {
 namespace {
 
 constexpr char kServo[] = "book/8.2.2";
@@ -193,4 +193,4 @@ TEST(ReferenceRun, WindsDownToStandstill) {
 }
 
 }  // namespace
-}  // namespace drivebench::web
+}  // namespace drivebench::web::reference_run_test

@@ -7,7 +7,7 @@
 
 #include "protocols/framing.hpp"
 
-namespace drivebench::web {
+namespace drivebench::web::send_queue_test {
 namespace {
 
 std::string samples_of(std::uint32_t axis, std::uint64_t first, int count, std::uint64_t dropped = 0) {
@@ -81,4 +81,4 @@ TEST(SendQueue, WEB_05_AnswersAlwaysGoThroughUpToALimit) {
 }
 
 }  // namespace
-}  // namespace drivebench::web
+}  // namespace drivebench::web::send_queue_test

@@ -12,7 +12,7 @@
 #include "tests/protocols/can/can_edge.hpp"
 #include "tests/protocols/can/can_sample.hpp"
 
-namespace drivebench::can {
+namespace drivebench::can::can_codec_test {
 namespace {
 
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
@@ -370,4 +370,4 @@ TEST(CanCodec, EdgesHaveTheirPlaces) {
 }
 
 }  // namespace
-}  // namespace drivebench::can
+}  // namespace drivebench::can::can_codec_test

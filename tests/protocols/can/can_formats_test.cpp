@@ -11,7 +11,7 @@
 #include "protocols/can/formats/socketcand.hpp"
 #include "tests/protocols/can/can_frames.hpp"
 
-namespace drivebench::can {
+namespace drivebench::can::can_formats_test {
 namespace {
 
 // ---- slcan ----
@@ -208,4 +208,4 @@ TEST(CanCandump, WritesTheLogFormat) {
 }
 
 }  // namespace
-}  // namespace drivebench::can
+}  // namespace drivebench::can::can_formats_test

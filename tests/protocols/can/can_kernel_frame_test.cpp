@@ -6,7 +6,7 @@
 
 #include "protocols/can/formats/kernel_frame.hpp"
 
-namespace drivebench::can {
+namespace drivebench::can::can_kernel_frame_test {
 namespace {
 
 // Catches: a flag or a byte of a frame that is lost in the kernel's form of it.
@@ -53,4 +53,4 @@ TEST(CanKernelFrame, TheFiltersTakeExactlyTheIdentifiers) {
 }
 
 }  // namespace
-}  // namespace drivebench::can
+}  // namespace drivebench::can::can_kernel_frame_test

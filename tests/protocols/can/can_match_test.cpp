@@ -8,7 +8,7 @@
 
 #include "tests/protocols/can/can_sample.hpp"
 
-namespace drivebench::can {
+namespace drivebench::can::can_match_test {
 namespace {
 
 Frame a_frame(Message message, bool fd, std::uint32_t node = 1) {
@@ -311,4 +311,4 @@ TEST(CanUnwrap, TheFirstNumberIsNeverNegative) {
 }
 
 }  // namespace
-}  // namespace drivebench::can
+}  // namespace drivebench::can::can_match_test

@@ -9,7 +9,7 @@
 #include "protocols/can/formats/msgpack.hpp"
 #include "tests/protocols/can/can_frames.hpp"
 
-namespace drivebench::can {
+namespace drivebench::can::can_msgpack_test {
 namespace {
 
 using namespace std::string_literals;
@@ -141,4 +141,4 @@ TEST(CanMsgpack, RefusesDeepAndEndlessValues) {
 }
 
 }  // namespace
-}  // namespace drivebench::can
+}  // namespace drivebench::can::can_msgpack_test

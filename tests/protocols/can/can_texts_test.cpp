@@ -7,7 +7,7 @@
 #include "protocols/can/table_text.hpp"
 #include "tests/protocols/can/can_sample.hpp"
 
-namespace drivebench::can {
+namespace drivebench::can::can_texts_test {
 namespace {
 
 void expect_time(const FrameTime& time, double least_us, double most_us) {
@@ -203,4 +203,4 @@ TEST(CanTexts, TheTableHasTheseLines) {
 }
 
 }  // namespace
-}  // namespace drivebench::can
+}  // namespace drivebench::can::can_texts_test

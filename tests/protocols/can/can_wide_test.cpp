@@ -12,7 +12,7 @@
 #include "protocols/signals/catalogue.hpp"
 #include "tests/protocols/can/can_sample.hpp"
 
-namespace drivebench::can {
+namespace drivebench::can::can_wide_test {
 namespace {
 
 Frame sent_by_wide(Message message, bool fd, Page page = Page{}) {
@@ -238,4 +238,4 @@ TEST(CanTexts, TheTableMarksTheFramesOfWideAxes) {
 }
 
 }  // namespace
-}  // namespace drivebench::can
+}  // namespace drivebench::can::can_wide_test

@@ -12,7 +12,7 @@
 #include "protocols/modbus/pdu.hpp"
 #include "protocols/modbus/register_map.hpp"
 
-namespace drivebench::modbus {
+namespace drivebench::modbus::modbus_map_test {
 namespace {
 
 constexpr auto kParameters = std::to_array<ParameterInfo>({
@@ -390,4 +390,4 @@ TEST(ModbusMapText, AxesOfDifferentKindsHaveTheirOwnParameters) {
 }
 
 }  // namespace
-}  // namespace drivebench::modbus
+}  // namespace drivebench::modbus::modbus_map_test

@@ -12,7 +12,7 @@
 #include "protocols/pages/man_page.hpp"
 #include "protocols/pages/write_pages.hpp"
 
-namespace drivebench::pages {
+namespace drivebench::pages::pages_test {
 namespace {
 
 /// A verb whose texts have every sign that troff or a shell takes for its own.
@@ -240,4 +240,4 @@ TEST(Pages, AnUnknownWordIsNamedWithItsVerb) {
 }
 
 }  // namespace
-}  // namespace drivebench::pages
+}  // namespace drivebench::pages::pages_test

@@ -11,7 +11,7 @@
 #include "bench.pb.h"
 #include "protocols/descriptor_set.hpp"
 
-namespace drivebench {
+namespace drivebench::catalogue_test {
 namespace {
 
 using google::protobuf::Descriptor;
@@ -165,4 +165,4 @@ TEST(Catalogue, NumbersOfTheWireStayAsTheyAre) {
 }
 
 }  // namespace
-}  // namespace drivebench
+}  // namespace drivebench::catalogue_test

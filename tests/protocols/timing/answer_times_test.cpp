@@ -6,7 +6,7 @@
 #include <nlohmann/json.hpp>
 #include <random>
 
-namespace drivebench {
+namespace drivebench::answer_times_test {
 namespace {
 
 // Catches: a bin that is too wide or that holds what belongs to its neighbour, a worst value that is only as
@@ -85,4 +85,4 @@ TEST(AnswerTimes, AreTheSameBehindTheirJson) {
 }
 
 }  // namespace
-}  // namespace drivebench
+}  // namespace drivebench::answer_times_test

@@ -4,7 +4,7 @@
 
 #include <string>
 
-namespace drivebench {
+namespace drivebench::admission_test {
 namespace {
 
 using namespace std::chrono_literals;
@@ -119,4 +119,4 @@ TEST(Admission, WithoutTokensEverySessionIsAnAdministrator) {
 }
 
 }  // namespace
-}  // namespace drivebench
+}  // namespace drivebench::admission_test

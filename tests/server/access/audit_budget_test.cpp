@@ -4,7 +4,7 @@
 
 #include <string>
 
-namespace drivebench {
+namespace drivebench::audit_budget_test {
 namespace {
 
 using namespace std::chrono_literals;
@@ -52,4 +52,4 @@ TEST_F(AuditBudgetTest, SEC_07_TheTableOfAddressesIsBounded) {
 }
 
 }  // namespace
-}  // namespace drivebench
+}  // namespace drivebench::audit_budget_test

@@ -16,7 +16,7 @@
 #include "tests/server/engine/engine_requests.hpp"
 #include "tests/server/recording/run_config.hpp"
 
-namespace drivebench {
+namespace drivebench::audit_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -295,4 +295,4 @@ TEST_F(AuditTest, SEC_07_OnlyTheServersUserReadsTheFile) {
 }
 
 }  // namespace
-}  // namespace drivebench
+}  // namespace drivebench::audit_test

@@ -8,7 +8,7 @@
 
 #include "server/access/address.hpp"
 
-namespace drivebench {
+namespace drivebench::places_test {
 namespace {
 
 const std::string kUnix(kUnixAddress);
@@ -154,4 +154,4 @@ TEST(Places, AnAddressIsThatOfAComputer) {
 }
 
 }  // namespace
-}  // namespace drivebench
+}  // namespace drivebench::places_test

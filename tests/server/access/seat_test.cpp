@@ -12,7 +12,7 @@
 #include "server/pacing/pacer.hpp"
 #include "tests/server/recording/run_config.hpp"
 
-namespace drivebench {
+namespace drivebench::seat_test {
 namespace {
 
 using namespace std::chrono_literals;
@@ -233,4 +233,4 @@ TEST_F(SlowSeatTest, ALossEmptiesTheSeatAtOnce) {
 }
 
 }  // namespace
-}  // namespace drivebench
+}  // namespace drivebench::seat_test

@@ -10,7 +10,7 @@
 #include "plant/parameters/parameters.hpp"
 #include "tests/server/bench/servo_bench.hpp"
 
-namespace drivebench {
+namespace drivebench::bench_change_test {
 namespace {
 
 constexpr Owner kOwner = 7;
@@ -400,4 +400,4 @@ TEST(BenchSharedShaft, IsSavedAndRestored) {
 }
 
 }  // namespace
-}  // namespace drivebench
+}  // namespace drivebench::bench_change_test

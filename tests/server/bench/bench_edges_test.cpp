@@ -3,7 +3,7 @@
 
 #include "tests/server/bench/servo_bench.hpp"
 
-namespace drivebench {
+namespace drivebench::bench_edges_test {
 namespace {
 
 constexpr Owner kOwner = 7;
@@ -83,4 +83,4 @@ TEST(BenchEdges, HoldRepeatsTheListAndQuickStopLetsTheLegsGo) {
 }
 
 }  // namespace
-}  // namespace drivebench
+}  // namespace drivebench::bench_edges_test

@@ -5,7 +5,7 @@
 
 #include "tests/server/bench/servo_bench.hpp"
 
-namespace drivebench {
+namespace drivebench::bench_lease_test {
 namespace {
 
 constexpr Owner kOwner = 7;
@@ -301,4 +301,4 @@ TEST(BenchLease, ALatchedAxisTakesOnlyCommandsWithTheGatesOff) {
 }
 
 }  // namespace
-}  // namespace drivebench
+}  // namespace drivebench::bench_lease_test

@@ -5,7 +5,7 @@
 
 #include "tests/server/bench/servo_bench.hpp"
 
-namespace drivebench {
+namespace drivebench::bench_shared_amplifier_test {
 namespace {
 
 constexpr Owner kOwner = 7;
@@ -151,4 +151,4 @@ TEST(BenchSharedAmplifier, WhatTheOwnerScheduledForTheSecondAxisGoesWithTheLease
 }
 
 }  // namespace
-}  // namespace drivebench
+}  // namespace drivebench::bench_shared_amplifier_test

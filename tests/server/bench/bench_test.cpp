@@ -9,7 +9,7 @@
 #include "plant/parameters/parameters.hpp"
 #include "tests/server/bench/servo_bench.hpp"
 
-namespace drivebench {
+namespace drivebench::bench_test {
 namespace {
 
 constexpr Owner kOwner = 7;
@@ -230,4 +230,4 @@ TEST(Bench, TheObserverSeesEveryInputWithItsTickAndEverySample) {
 }
 
 }  // namespace
-}  // namespace drivebench
+}  // namespace drivebench::bench_test

@@ -6,7 +6,7 @@
 #include "protocols/signals/catalogue.hpp"
 #include "tests/server/bench/servo_bench.hpp"
 
-namespace drivebench {
+namespace drivebench::bench_trigger_test {
 namespace {
 
 /// A condition on the load torque, which a test can set to the tick.
@@ -146,4 +146,4 @@ TEST(BenchTrigger, WhatCannotBeDoneIsCounted) {
 }
 
 }  // namespace
-}  // namespace drivebench
+}  // namespace drivebench::bench_trigger_test

@@ -7,7 +7,7 @@
 
 #include "tests/server/bench/servo_bench.hpp"
 
-namespace drivebench {
+namespace drivebench::brutal_plant_test {
 namespace {
 
 constexpr Owner kOwner = 7;
@@ -78,4 +78,4 @@ TEST(BrutalPlant, CMD_15_AMillionStepsOfEachStayFinite) {
 }
 
 }  // namespace
-}  // namespace drivebench
+}  // namespace drivebench::brutal_plant_test

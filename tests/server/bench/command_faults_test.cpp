@@ -10,7 +10,7 @@
 #include "protocols/signals/catalogue.hpp"
 #include "tests/server/bench/servo_bench.hpp"
 
-namespace drivebench {
+namespace drivebench::command_faults_test {
 namespace {
 
 constexpr Owner kOwner = 7;
@@ -218,4 +218,4 @@ TEST(CommandFaults, CMD_11_NegativeZerosAndDenormalsAreLegalAndKeepTheirBits) {
 }
 
 }  // namespace
-}  // namespace drivebench
+}  // namespace drivebench::command_faults_test

@@ -5,7 +5,7 @@
 
 #include "tests/server/bench/servo_bench.hpp"
 
-namespace drivebench {
+namespace drivebench::command_rules_test {
 namespace {
 
 constexpr Owner kOwner = 7;
@@ -177,4 +177,4 @@ TEST(CommandRules, CMD_13_TheSlewLimitOfADutyIsAPartOfTheSupply) {
 }
 
 }  // namespace
-}  // namespace drivebench
+}  // namespace drivebench::command_rules_test

@@ -7,7 +7,7 @@
 
 #include "tests/server/bench/servo_bench.hpp"
 
-namespace drivebench {
+namespace drivebench::control_states_test {
 namespace {
 
 constexpr Owner kOwner = 7;
@@ -110,4 +110,4 @@ TEST(ControlStates, STATE_01_AgreeWithTheReferenceInEveryPatternOfLosses) {
 }
 
 }  // namespace
-}  // namespace drivebench
+}  // namespace drivebench::control_states_test

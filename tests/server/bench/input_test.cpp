@@ -8,7 +8,7 @@
 #include <limits>
 #include <vector>
 
-namespace drivebench {
+namespace drivebench::input_test {
 namespace {
 
 Input input_with(const decltype(Input::action)& action) {
@@ -127,4 +127,4 @@ TEST(Input, FaultsAreCheckedByTheirTable) {
 }
 
 }  // namespace
-}  // namespace drivebench
+}  // namespace drivebench::input_test

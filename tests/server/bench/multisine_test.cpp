@@ -9,7 +9,7 @@
 
 #include "tests/server/bench/servo_bench.hpp"
 
-namespace drivebench {
+namespace drivebench::multisine_test {
 namespace {
 
 constexpr MultisineLines kLines{.period_ticks = 400, .lowest = 2, .highest = 150, .ratio = 1.5};
@@ -130,4 +130,4 @@ TEST(Multisine, GoesOnInARestoredState) {
 }
 
 }  // namespace
-}  // namespace drivebench
+}  // namespace drivebench::multisine_test

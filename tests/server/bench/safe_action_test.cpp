@@ -6,7 +6,7 @@
 
 #include "tests/server/bench/servo_bench.hpp"
 
-namespace drivebench {
+namespace drivebench::safe_action_test {
 namespace {
 
 constexpr Owner kOwner = 7;
@@ -266,4 +266,4 @@ TEST(SafeAction, TheFaultLineOfTheGateDriverHoldsItsLatch) {
 }
 
 }  // namespace
-}  // namespace drivebench
+}  // namespace drivebench::safe_action_test

@@ -9,7 +9,7 @@
 #include "server/config/config.hpp"
 #include "tests/server/config/config_test_bench.hpp"
 
-namespace drivebench::test {
+namespace drivebench::test::can_test {
 namespace {
 
 /// kBench with one bus: [[can]] stands in line 21, `lines` from line 22 on.
@@ -346,4 +346,4 @@ TEST(ConfigCan, BackEndsAreNamedAsInTheFile) {
 }
 
 }  // namespace
-}  // namespace drivebench::test
+}  // namespace drivebench::test::can_test

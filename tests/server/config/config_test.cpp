@@ -10,7 +10,7 @@
 
 #include "tests/server/config/config_test_bench.hpp"
 
-namespace drivebench::test {
+namespace drivebench::test::config_test {
 namespace {
 
 // Catches: a shipped bench or motor that the reader no longer takes.
@@ -301,4 +301,4 @@ TEST(Config, TimesAreWholeNanosecondsAndTicks) {
 }
 
 }  // namespace
-}  // namespace drivebench::test
+}  // namespace drivebench::test::config_test

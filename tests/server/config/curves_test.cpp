@@ -9,7 +9,7 @@
 #include "protocols/text.hpp"
 #include "tests/server/config/config_test_bench.hpp"
 
-namespace drivebench::test {
+namespace drivebench::test::curves_test {
 namespace {
 
 /// kBench with this value for the curve of the load torque over time.
@@ -157,4 +157,4 @@ TEST(ConfigCurves, AHundredThousandPointsFitAndReadBack) {
 }
 
 }  // namespace
-}  // namespace drivebench::test
+}  // namespace drivebench::test::curves_test

@@ -9,7 +9,7 @@
 #include "tests/server/config/config_test_bench.hpp"
 #include "tests/server/parameter_row.hpp"
 
-namespace drivebench::test {
+namespace drivebench::test::events_test {
 namespace {
 
 const std::string kSet = "[[axis.set]]\nparameter = \"machine.rotor_resistance_ohm\"\n";
@@ -208,4 +208,4 @@ TEST(ConfigEvents, AreBounded) {
 }
 
 }  // namespace
-}  // namespace drivebench::test
+}  // namespace drivebench::test::events_test

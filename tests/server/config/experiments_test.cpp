@@ -3,7 +3,7 @@
 
 #include "tests/server/config/config_test_bench.hpp"
 
-namespace drivebench {
+namespace drivebench::experiments_test {
 namespace {
 
 using namespace test;
@@ -50,4 +50,4 @@ TEST(ConfigExperiments, TheFolderLiesBesideTheBenchFileAndIsNotRecorded) {
 }
 
 }  // namespace
-}  // namespace drivebench
+}  // namespace drivebench::experiments_test

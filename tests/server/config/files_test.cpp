@@ -8,7 +8,7 @@
 
 #include "tests/server/config/config_test_bench.hpp"
 
-namespace drivebench::test {
+namespace drivebench::test::files_test {
 namespace {
 
 // Catches: an override that is lost or that hides the motor's other values.
@@ -185,4 +185,4 @@ TEST(ConfigFiles, ATextWithoutAFolderMayNameNoOtherFile) {
 }
 
 }  // namespace
-}  // namespace drivebench::test
+}  // namespace drivebench::test::files_test

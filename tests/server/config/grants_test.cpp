@@ -12,7 +12,7 @@
 #include "tests/server/access/instruction_path.hpp"
 #include "tests/server/config/config_test_bench.hpp"
 
-namespace drivebench::test {
+namespace drivebench::test::grants_test {
 namespace {
 
 using std::chrono::sys_seconds;
@@ -176,4 +176,4 @@ TEST(Grants, SEC_04_AWrongFileIsRefusedWithoutNamingItsTokens) {
 }
 
 }  // namespace
-}  // namespace drivebench::test
+}  // namespace drivebench::test::grants_test

@@ -9,7 +9,7 @@
 #include "server/config/config.hpp"
 #include "tests/server/config/config_test_bench.hpp"
 
-namespace drivebench::test {
+namespace drivebench::test::machine_test {
 namespace {
 
 /// kBench with another machine; its keys begin at line 8.
@@ -215,4 +215,4 @@ TEST(ConfigSubsteps, ACurrentLoopNeedsShortSteps) {
 }
 
 }  // namespace
-}  // namespace drivebench::test
+}  // namespace drivebench::test::machine_test

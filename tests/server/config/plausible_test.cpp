@@ -13,7 +13,7 @@
 #include "server/config/words.hpp"
 #include "tests/server/config/config_test_bench.hpp"
 
-namespace drivebench::test {
+namespace drivebench::test::plausible_test {
 namespace {
 
 std::string oddities_of(const fs::path& file) {
@@ -100,4 +100,4 @@ TEST(ConfigPlausible, CFG_02_EveryBenchFitsAndAMillionTimesItsValuesDoNot) {
 }
 
 }  // namespace
-}  // namespace drivebench::test
+}  // namespace drivebench::test::plausible_test

@@ -8,7 +8,7 @@
 
 #include "tests/server/config/config_test_bench.hpp"
 
-namespace drivebench::test {
+namespace drivebench::test::rules_test {
 namespace {
 
 // Catches: a reader that stops at the first problem, or names the wrong line.
@@ -152,4 +152,4 @@ TEST(ConfigRules, CFG_05_StepTooLongForTheMachineIsRefusedWithTheSubstepsItNeeds
 }
 
 }  // namespace
-}  // namespace drivebench::test
+}  // namespace drivebench::test::rules_test

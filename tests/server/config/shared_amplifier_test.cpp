@@ -8,7 +8,7 @@
 #include "server/config/config.hpp"
 #include "tests/server/config/config_test_bench.hpp"
 
-namespace drivebench::test {
+namespace drivebench::test::shared_amplifier_test {
 namespace {
 
 /// A second axis on the amplifier of the first.
@@ -100,4 +100,4 @@ TEST(ConfigAmplifier, TheDriveAndTheWindingsMustSuitBoth) {
 }
 
 }  // namespace
-}  // namespace drivebench::test
+}  // namespace drivebench::test::shared_amplifier_test

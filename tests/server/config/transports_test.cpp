@@ -8,7 +8,7 @@
 #include "server/config/config.hpp"
 #include "tests/server/config/config_test_bench.hpp"
 
-namespace drivebench::test {
+namespace drivebench::test::transports_test {
 namespace {
 
 /// kBench with [modbus] in line 21 and `lines` from line 22 on.
@@ -159,4 +159,4 @@ TEST(ConfigTransports, ShippedBenchesAreTheServoBenchWithABus) {
 }
 
 }  // namespace
-}  // namespace drivebench::test
+}  // namespace drivebench::test::transports_test

@@ -7,7 +7,7 @@
 #include "server/config/config.hpp"
 #include "tests/server/config/config_test_bench.hpp"
 
-namespace drivebench::test {
+namespace drivebench::test::triggers_test {
 namespace {
 
 const std::string kFault = "[[axis.fault]]\nname = \"open_phase\"\nvalue = 2\n";
@@ -115,4 +115,4 @@ TEST(ConfigTriggers, TheStateOfAnEventFollowsTheRun) {
 }
 
 }  // namespace
-}  // namespace drivebench::test
+}  // namespace drivebench::test::triggers_test

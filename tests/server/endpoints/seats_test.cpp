@@ -21,7 +21,7 @@
 #include "tests/server/endpoints/simulated_clock.hpp"
 #include "tests/server/recording/run_config.hpp"
 
-namespace drivebench {
+namespace drivebench::seats_test {
 namespace {
 
 using namespace std::chrono_literals;
@@ -394,4 +394,4 @@ INSTANTIATE_TEST_SUITE_P(
     [](const auto& tested) { return tested.param.name; });
 
 }  // namespace
-}  // namespace drivebench
+}  // namespace drivebench::seats_test

@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace drivebench {
+namespace drivebench::answer_clock_test {
 namespace {
 
 constexpr Owner kFirst = 1;
@@ -82,4 +82,4 @@ TEST_F(AnswerClocks, InRealTimeAVeryLateAnswerCountsFromItsTick) {
 }
 
 }  // namespace
-}  // namespace drivebench
+}  // namespace drivebench::answer_clock_test

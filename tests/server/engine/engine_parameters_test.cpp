@@ -12,7 +12,7 @@
 #include "tests/server/engine/engine_requests.hpp"
 #include "tests/server/recording/run_config.hpp"
 
-namespace drivebench {
+namespace drivebench::engine_parameters_test {
 namespace {
 
 // Catches: an event of the configuration that never happens, on another axis, or at another tick.
@@ -184,4 +184,4 @@ TEST(ThreadedEngine, CurrentsNeedACurrentAmplifier) {
 }
 
 }  // namespace
-}  // namespace drivebench
+}  // namespace drivebench::engine_parameters_test

@@ -11,7 +11,7 @@
 #include "tests/server/engine/engine_requests.hpp"
 #include "tests/server/recording/run_config.hpp"
 
-namespace drivebench {
+namespace drivebench::engine_requests_test {
 namespace {
 
 constexpr std::size_t kRequestsThatWait = 256;
@@ -101,4 +101,4 @@ TEST_F(EngineRequests, AtMostOneEndOfALeaseWaitsForEachOwner) {
 }
 
 }  // namespace
-}  // namespace drivebench
+}  // namespace drivebench::engine_requests_test

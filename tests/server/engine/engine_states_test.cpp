@@ -10,7 +10,7 @@
 #include "tests/server/engine/engine_requests.hpp"
 #include "tests/server/recording/run_config.hpp"
 
-namespace drivebench {
+namespace drivebench::engine_states_test {
 namespace {
 
 constexpr Tick kRunTicks = 20'000;
@@ -114,4 +114,4 @@ TEST(EngineStates, ParametersGoBackToo) {
 }
 
 }  // namespace
-}  // namespace drivebench
+}  // namespace drivebench::engine_states_test

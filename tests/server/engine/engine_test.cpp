@@ -16,7 +16,7 @@
 #include "tests/server/engine/engine_requests.hpp"
 #include "tests/server/recording/run_config.hpp"
 
-namespace drivebench {
+namespace drivebench::engine_test {
 namespace {
 
 /// The same run without any engine.
@@ -358,4 +358,4 @@ TEST(ThreadedEngine, MayBeDestroyedWhileItRuns) {
 }
 
 }  // namespace
-}  // namespace drivebench
+}  // namespace drivebench::engine_test

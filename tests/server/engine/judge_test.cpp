@@ -16,7 +16,7 @@
 #include "tests/server/engine/engine_requests.hpp"
 #include "tests/server/recording/run_config.hpp"
 
-namespace drivebench {
+namespace drivebench::judge_test {
 namespace {
 
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
@@ -231,4 +231,4 @@ TEST(CommandMail, AnOwnerStaysOwnerUntilTheSampleShowsTheEndOfItsLease) {
 }
 
 }  // namespace
-}  // namespace drivebench
+}  // namespace drivebench::judge_test

@@ -11,7 +11,7 @@
 #include "tests/server/recording/disks.hpp"
 #include "tests/server/recording/run_config.hpp"
 
-namespace drivebench {
+namespace drivebench::lockstep_engine_test {
 namespace {
 
 /// A run whose disk can be made to stand still.
@@ -225,4 +225,4 @@ TEST(LockstepEngine, CheckGivesTheAnswerOfCommand) {
 }
 
 }  // namespace
-}  // namespace drivebench
+}  // namespace drivebench::lockstep_engine_test

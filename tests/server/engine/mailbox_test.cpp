@@ -6,7 +6,7 @@
 #include <atomic>
 #include <thread>
 
-namespace drivebench {
+namespace drivebench::mailbox_test {
 namespace {
 
 // Catches: a value before there is one, the same one twice, an old one in place of the newest.
@@ -59,4 +59,4 @@ TEST(Mailbox, TwoThreadsNeverSeeATornOrOldValue) {
 }
 
 }  // namespace
-}  // namespace drivebench
+}  // namespace drivebench::mailbox_test

@@ -13,7 +13,7 @@
 #include "tests/server/engine/engine_requests.hpp"
 #include "tests/server/recording/run_config.hpp"
 
-namespace drivebench {
+namespace drivebench::without_lease_test {
 namespace {
 
 const Client kAnna{.transport = "tcp", .peer = "192.0.2.1:5000", .subject = {}};
@@ -194,4 +194,4 @@ TEST(WithoutLeaseReplay, REC_12_OldRecordingsReplay) {
 }
 
 }  // namespace
-}  // namespace drivebench
+}  // namespace drivebench::without_lease_test

@@ -6,7 +6,7 @@
 
 #include "tests/server/experiments/experiment_requests.hpp"
 
-namespace drivebench {
+namespace drivebench::experiment_plan_test {
 namespace {
 
 /// The field that the refusal of a request names.
@@ -243,4 +243,4 @@ TEST(ExperimentPlan, AllRequestsShareTheSequencesOfBits) {
 }
 
 }  // namespace
-}  // namespace drivebench
+}  // namespace drivebench::experiment_plan_test

@@ -13,7 +13,7 @@
 #include "tests/server/experiments/experiment_requests.hpp"
 #include "tests/server/recording/run_config.hpp"
 
-namespace drivebench {
+namespace drivebench::experiment_queue_test {
 namespace {
 
 using namespace std::chrono_literals;
@@ -291,4 +291,4 @@ TEST_F(ExperimentQueue, TheLongestListFitsIntoAnAnswer) {
 }
 
 }  // namespace
-}  // namespace drivebench
+}  // namespace drivebench::experiment_queue_test

@@ -9,7 +9,7 @@
 #include "tests/server/experiments/experiment_requests.hpp"
 #include "tests/server/recording/disks.hpp"
 
-namespace drivebench {
+namespace drivebench::experiment_run_test {
 namespace {
 
 struct Ran {
@@ -146,4 +146,4 @@ TEST(ExperimentRun, REC_03_EndsBeforeTheDiskIsFullAndSaysWhy) {
 }
 
 }  // namespace
-}  // namespace drivebench
+}  // namespace drivebench::experiment_run_test

@@ -13,7 +13,7 @@
 #include "server/experiments/shapes.hpp"
 #include "tests/server/recording/run_config.hpp"
 
-namespace drivebench {
+namespace drivebench::experiment_shapes_test {
 namespace {
 
 constexpr double kPeriodS = 1e-3;
@@ -230,4 +230,4 @@ TEST(ExperimentShapes, AMappedTableIsReadWhereItIsNeeded) {
 }
 
 }  // namespace
-}  // namespace drivebench
+}  // namespace drivebench::experiment_shapes_test

@@ -6,7 +6,7 @@
 #include <numeric>
 #include <thread>
 
-namespace drivebench {
+namespace drivebench::octave_histogram_test {
 namespace {
 
 // Catches: a bucket whose edge belongs to its neighbour, percentiles off by a bucket, a worst case that is
@@ -74,4 +74,4 @@ TEST(SharedOctaveHistogram, AnotherThreadLooksWhileEntriesCome) {
 }
 
 }  // namespace
-}  // namespace drivebench
+}  // namespace drivebench::octave_histogram_test

@@ -12,7 +12,7 @@
 #include "tests/server/engine/engine_requests.hpp"
 #include "tests/server/recording/run_config.hpp"
 
-namespace drivebench {
+namespace drivebench::device_messages_test {
 namespace {
 
 Condition condition_of(const std::string& text) {
@@ -134,4 +134,4 @@ TEST(DeviceMessages, AFullPipeIsAProblemAndNoWait) {
 }
 
 }  // namespace
-}  // namespace drivebench
+}  // namespace drivebench::device_messages_test

@@ -6,7 +6,7 @@
 #include <string>
 #include <thread>
 
-namespace drivebench {
+namespace drivebench::pacer_test {
 namespace {
 
 constexpr std::int64_t kPeriodNs = 200'000;
@@ -146,4 +146,4 @@ TEST(EnterRealtime, OS_07_ReportsRightsThatWereNotGranted) {
 }
 
 }  // namespace
-}  // namespace drivebench
+}  // namespace drivebench::pacer_test

@@ -10,7 +10,7 @@
 
 #include "tests/server/recording/run_config.hpp"
 
-namespace drivebench {
+namespace drivebench::tick_clock_test {
 namespace {
 
 /// Ticks that are so late, one after the other.
@@ -103,4 +103,4 @@ TEST(TickClock, AFreeRunHasNoLateTicks) {
 }
 
 }  // namespace
-}  // namespace drivebench
+}  // namespace drivebench::tick_clock_test

@@ -16,7 +16,7 @@
 #include "server/recording/recording.hpp"
 #include "tests/server/recording/run_config.hpp"
 
-namespace drivebench {
+namespace drivebench::recorder_test {
 namespace {
 
 bool same_words(const Sample& a, const Sample& b) {
@@ -291,4 +291,4 @@ TEST(Recorder, MayBeDestroyedWithoutFinish) {
 }
 
 }  // namespace
-}  // namespace drivebench
+}  // namespace drivebench::recorder_test

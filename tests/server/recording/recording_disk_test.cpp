@@ -11,7 +11,7 @@
 #include "tests/server/recording/disks.hpp"
 #include "tests/server/recording/run_config.hpp"
 
-namespace drivebench {
+namespace drivebench::recording_disk_test {
 namespace {
 
 using Bytes = std::vector<std::byte>;
@@ -395,4 +395,4 @@ TEST(RecordingDisk, LIMIT_10_TheQueueHoldsTwoSecondsOfEveryBench) {
 }
 
 }  // namespace
-}  // namespace drivebench
+}  // namespace drivebench::recording_disk_test

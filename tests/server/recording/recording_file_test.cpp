@@ -13,7 +13,7 @@
 #include "server/recording/recording_writer.hpp"
 #include "tests/server/recording/run_config.hpp"
 
-namespace drivebench {
+namespace drivebench::recording_file_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -196,4 +196,4 @@ TEST(RecordingFiles, REC_13_AFolderThatIsRemovedEndsTheRecording) {
 }
 
 }  // namespace
-}  // namespace drivebench
+}  // namespace drivebench::recording_file_test

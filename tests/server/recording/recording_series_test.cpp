@@ -10,7 +10,7 @@
 #include "server/recording/replay.hpp"
 #include "tests/server/recording/run_config.hpp"
 
-namespace drivebench {
+namespace drivebench::recording_series_test {
 namespace {
 
 constexpr Tick kPeriodsPerDay = 86'400;
@@ -156,4 +156,4 @@ TEST(RecordingSeries, FilesAreNumberedBesideTheFirst) {
 }
 
 }  // namespace
-}  // namespace drivebench
+}  // namespace drivebench::recording_series_test

@@ -21,7 +21,7 @@
 #include "server/recording/recording.hpp"
 #include "tests/server/recording/run_config.hpp"
 
-namespace drivebench {
+namespace drivebench::replay_test {
 namespace {
 
 using Result = ReplayReport::Result;
@@ -450,4 +450,4 @@ TEST(Replay, AFileThatIsNoRecordingIsUnusable) {
 }
 
 }  // namespace
-}  // namespace drivebench
+}  // namespace drivebench::replay_test

@@ -6,7 +6,7 @@
 #include <set>
 #include <thread>
 
-namespace drivebench {
+namespace drivebench::spsc_queue_test {
 namespace {
 
 // Catches: a capacity that is more, or less, than the requested one.
@@ -122,4 +122,4 @@ TEST(SpscQueue, TwoThreadsSeeEveryEntryOnceAndInOrder) {
 }
 
 }  // namespace
-}  // namespace drivebench
+}  // namespace drivebench::spsc_queue_test

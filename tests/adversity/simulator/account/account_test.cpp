@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-namespace drivebench::simulator {
+namespace drivebench::simulator::account_test {
 namespace {
 
 constexpr Owner kAnna = 9;
@@ -74,4 +74,4 @@ TEST_F(AccountTest, TheLeaseOfAClosedSessionIsGivenBack) {
 }
 
 }  // namespace
-}  // namespace drivebench::simulator
+}  // namespace drivebench::simulator::account_test

@@ -5,7 +5,7 @@
 #include <utility>
 #include <vector>
 
-namespace drivebench::simulator {
+namespace drivebench::simulator::io_pauses_test {
 namespace {
 
 constexpr Time kLimit = 2000 * kMillisecond;
@@ -41,4 +41,4 @@ TEST(IoPauses, ALimitThatEndsInAPauseIsLongerByTheRestOfThePause) {
 }
 
 }  // namespace
-}  // namespace drivebench::simulator
+}  // namespace drivebench::simulator::io_pauses_test

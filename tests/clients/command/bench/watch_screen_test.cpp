@@ -13,7 +13,7 @@
 
 #include "clients/command/bench/watch_text.hpp"
 
-namespace drivebench::command {
+namespace drivebench::command::watch_screen_test {
 namespace {
 
 std::string with_unit(std::string_view name, const Sample& sample, bool utf8 = true) {
@@ -191,4 +191,4 @@ TEST(Watch, TheBlockFitsIntoTheTerminal) {
 }
 
 }  // namespace
-}  // namespace drivebench::command
+}  // namespace drivebench::command::watch_screen_test

@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace drivebench::command {
+namespace drivebench::command::watch_test {
 namespace {
 
 std::string shown(std::string_view name, const Sample& sample) {
@@ -21,4 +21,4 @@ TEST(Watch, ShowsAMagnitudeFarBelowTheUsualRangeAsZero) {
 }
 
 }  // namespace
-}  // namespace drivebench::command
+}  // namespace drivebench::command::watch_test

@@ -10,7 +10,7 @@
 #include <cstring>
 #include <random>
 
-namespace drivebench::command {
+namespace drivebench::command::can_check_test {
 namespace {
 
 using Bytes = std::vector<std::byte>;
@@ -173,4 +173,4 @@ TEST(CanCheck, AMissingInterfaceIsAnError) {
 }
 
 }  // namespace
-}  // namespace drivebench::command
+}  // namespace drivebench::command::can_check_test

@@ -7,7 +7,7 @@
 
 #include "clients/command/common/programs/server_ready.hpp"
 
-namespace drivebench::command {
+namespace drivebench::command::process_test {
 namespace {
 
 using namespace std::chrono_literals;
@@ -43,4 +43,4 @@ TEST(ServerReady, ReadsOnlyTheServersOwnLines) {
 }
 
 }  // namespace
-}  // namespace drivebench::command
+}  // namespace drivebench::command::process_test

@@ -11,7 +11,7 @@
 #include "clients/command/experiment/experiment.hpp"
 #include "clients/command/identify/identify.hpp"
 
-namespace drivebench::command {
+namespace drivebench::command::session_test {
 namespace {
 
 // Catches: a link of another kind that is taken for the name of a host.
@@ -46,4 +46,4 @@ TEST(Links, LatchedFaultsAreKnownWithOrWithoutADescription) {
 }
 
 }  // namespace
-}  // namespace drivebench::command
+}  // namespace drivebench::command::session_test

@@ -9,7 +9,7 @@
 #include "clients/command/control/control_json.hpp"
 #include "clients/identification/data/measured_data.hpp"
 
-namespace drivebench::command {
+namespace drivebench::command::control_run_test {
 namespace {
 
 // Catches: a key that one side writes and the other does not read.
@@ -135,4 +135,4 @@ TEST(ControlRunCsv, SpeaksTheDialectOfExport) {
 }
 
 }  // namespace
-}  // namespace drivebench::command
+}  // namespace drivebench::command::control_run_test

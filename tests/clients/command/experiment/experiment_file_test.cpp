@@ -11,7 +11,7 @@
 #include "clients/command/experiment/experiment_data.hpp"
 #include "protocols/document.hpp"
 
-namespace drivebench::command {
+namespace drivebench::command::experiment_file_test {
 namespace {
 
 const std::string kGood =
@@ -195,4 +195,4 @@ TEST_F(Csv, RepeatedRowsAreWrittenOnce) {
 }
 
 }  // namespace
-}  // namespace drivebench::command
+}  // namespace drivebench::command::experiment_file_test

@@ -17,7 +17,7 @@
 #include "protocols/sample_codec.hpp"
 #include "protocols/signals/catalogue.hpp"
 
-namespace drivebench::command {
+namespace drivebench::command::identify_data_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -220,4 +220,4 @@ TEST(IdentifyData, CsvReadsBack) {
 }
 
 }  // namespace
-}  // namespace drivebench::command
+}  // namespace drivebench::command::identify_data_test

@@ -9,7 +9,7 @@
 #include "clients/command/identify/identify.hpp"
 #include "protocols/document.hpp"
 
-namespace drivebench::command {
+namespace drivebench::command::identify_map_test {
 namespace {
 
 using identification::ColumnMap;
@@ -118,4 +118,4 @@ TEST(IdentifyMap, TheCommandLineOverridesTheFile) {
 }
 
 }  // namespace
-}  // namespace drivebench::command
+}  // namespace drivebench::command::identify_map_test

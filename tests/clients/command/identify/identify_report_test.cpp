@@ -8,7 +8,7 @@
 
 #include "clients/command/identify/identify_json.hpp"
 
-namespace drivebench::command {
+namespace drivebench::command::identify_report_test {
 namespace {
 
 IdentifyReport some_report() {
@@ -74,4 +74,4 @@ TEST(IdentifyReport, JsonHasParametersSettingsAndValidation) {
 }
 
 }  // namespace
-}  // namespace drivebench::command
+}  // namespace drivebench::command::identify_report_test

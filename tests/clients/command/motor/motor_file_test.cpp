@@ -8,7 +8,7 @@
 #include "clients/command/common/basics/errors.hpp"
 #include "protocols/document.hpp"
 
-namespace drivebench::command {
+namespace drivebench::command::motor_file_test {
 namespace {
 
 /// A file that goes with the test.
@@ -68,4 +68,4 @@ TEST_F(MotorFile, RefusesWhatHasNoCircuit) {
 }
 
 }  // namespace
-}  // namespace drivebench::command
+}  // namespace drivebench::command::motor_file_test

@@ -15,7 +15,7 @@
 #include "protocols/mcap/mcap.hpp"
 #include "protocols/sample_codec.hpp"
 
-namespace drivebench::command {
+namespace drivebench::command::export_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -260,4 +260,4 @@ TEST_F(CommandFiles, ExportRefusesAnImpossibleProfile) {
 }
 
 }  // namespace
-}  // namespace drivebench::command
+}  // namespace drivebench::command::export_test

@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-namespace drivebench::command {
+namespace drivebench::command::svg_plot_test {
 namespace {
 
 struct Point {
@@ -83,4 +83,4 @@ TEST(SvgPlot, AnAxisHasTheQuantityAndItsUnit) {
 }
 
 }  // namespace
-}  // namespace drivebench::command
+}  // namespace drivebench::command::svg_plot_test

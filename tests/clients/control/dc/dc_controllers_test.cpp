@@ -17,7 +17,7 @@
 #include "clients/control/moves/standard_inputs.hpp"
 #include "tests/clients/control/dc/ideal_dc_shaft.hpp"
 
-namespace drivebench::control {
+namespace drivebench::control::dc_controllers_test {
 namespace {
 
 constexpr DcMachineModel kDcA = {.resistance_ohm = 2.0,
@@ -413,4 +413,4 @@ TEST(DcAxis, ACurrentLoopTooFastForTheSamplesIsReported) {
 }
 
 }  // namespace
-}  // namespace drivebench::control
+}  // namespace drivebench::control::dc_controllers_test

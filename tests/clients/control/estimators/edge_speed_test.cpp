@@ -5,7 +5,7 @@
 #include <cmath>
 #include <numbers>
 
-namespace drivebench::control {
+namespace drivebench::control::edge_speed_test {
 namespace {
 
 constexpr double kCount_rad = 2.0 * std::numbers::pi / 2000.0;
@@ -63,4 +63,4 @@ TEST(EdgeSpeed, ShakingOnOneEdgeIsNoSpeed) {
 }
 
 }  // namespace
-}  // namespace drivebench::control
+}  // namespace drivebench::control::edge_speed_test

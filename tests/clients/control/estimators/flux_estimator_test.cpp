@@ -10,7 +10,7 @@
 #include "plant/math/unbounded.hpp"
 #include "tests/clients/control/induction/servo_motor.hpp"
 
-namespace drivebench::control {
+namespace drivebench::control::flux_estimator_test {
 namespace {
 
 constexpr double kPeriod_s = 125e-6;
@@ -121,4 +121,4 @@ TEST(FluxEstimator, NumbersThatTheObserverCannotBearAreNamed) {
 }
 
 }  // namespace
-}  // namespace drivebench::control
+}  // namespace drivebench::control::flux_estimator_test

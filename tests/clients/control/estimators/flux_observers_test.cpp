@@ -8,7 +8,7 @@
 #include "clients/control/math/wrapped.hpp"
 #include "tests/clients/control/induction/servo_motor.hpp"
 
-namespace drivebench::control {
+namespace drivebench::control::flux_observers_test {
 namespace {
 
 using Complex = std::complex<double>;
@@ -155,4 +155,4 @@ TEST(MartinRouchonObserver, ErrorFollowsItsClosedForm) {
 }
 
 }  // namespace
-}  // namespace drivebench::control
+}  // namespace drivebench::control::flux_observers_test

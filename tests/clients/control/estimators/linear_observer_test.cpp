@@ -7,7 +7,7 @@
 
 #include "clients/control/estimators/shaft_observers.hpp"
 
-namespace drivebench::control {
+namespace drivebench::control::linear_observer_test {
 namespace {
 
 constexpr double kFriction = 4e-4 / 6e-5;
@@ -124,4 +124,4 @@ TEST(LinearObserver, ThePositionCannotBeObservedFromTheSpeed) {
 }
 
 }  // namespace
-}  // namespace drivebench::control
+}  // namespace drivebench::control::linear_observer_test

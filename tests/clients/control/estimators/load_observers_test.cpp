@@ -11,7 +11,7 @@
 #include "plant/math/unbounded.hpp"
 #include "tests/clients/control/induction/servo_motor.hpp"
 
-namespace drivebench::control {
+namespace drivebench::control::load_observers_test {
 namespace {
 
 constexpr double kPeriod_s = 125e-6;
@@ -123,4 +123,4 @@ TEST(CoupledObserver, FindsAllFourStates) {
 }
 
 }  // namespace
-}  // namespace drivebench::control
+}  // namespace drivebench::control::load_observers_test

@@ -8,7 +8,7 @@
 #include "clients/control/math/wrapped.hpp"
 #include "plant/math/unbounded.hpp"
 
-namespace drivebench::control {
+namespace drivebench::control::observers_test {
 namespace {
 
 constexpr InductionMachineModel kServo = {.pole_pairs = 3.0,
@@ -137,4 +137,4 @@ TEST(BackwardDifference, IsCountsPerElapsedTimeAndStartsAtZero) {
 }
 
 }  // namespace
-}  // namespace drivebench::control
+}  // namespace drivebench::control::observers_test

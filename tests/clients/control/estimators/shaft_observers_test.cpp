@@ -7,7 +7,7 @@
 #include "clients/control/estimators/shaft_estimator.hpp"
 #include "tests/clients/control/dc/ideal_dc_shaft.hpp"
 
-namespace drivebench::control {
+namespace drivebench::control::shaft_observers_test {
 namespace {
 
 constexpr double kFriction = 4e-4 / 6e-5;
@@ -171,4 +171,4 @@ TEST(ShaftEstimator, ReadsATachometer) {
 }
 
 }  // namespace
-}  // namespace drivebench::control
+}  // namespace drivebench::control::shaft_observers_test

@@ -7,7 +7,7 @@
 
 #include "clients/control/loop/three_phase.hpp"
 
-namespace drivebench::control {
+namespace drivebench::control::shaft_sensing_test {
 namespace {
 
 constexpr SpeedObserverGains kGains = SpeedObserverGains::placed(500.0, 500.0, 0.0);
@@ -65,4 +65,4 @@ TEST(ThreePhase, IsPowerInvariantAndInvertible) {
 }
 
 }  // namespace
-}  // namespace drivebench::control
+}  // namespace drivebench::control::shaft_sensing_test

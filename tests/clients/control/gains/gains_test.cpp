@@ -8,7 +8,7 @@
 #include "clients/control/loop/run.hpp"
 #include "clients/control/presets/presets.hpp"
 
-namespace drivebench::control {
+namespace drivebench::control::gains_test {
 namespace {
 
 std::string refusal(const Preset& preset, const Gain& gain) {
@@ -56,4 +56,4 @@ TEST(Gains, WrongNamesAndValuesAreRefusedInWords) {
 }
 
 }  // namespace
-}  // namespace drivebench::control
+}  // namespace drivebench::control::gains_test

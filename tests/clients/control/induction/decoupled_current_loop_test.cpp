@@ -8,7 +8,7 @@
 #include "plant/math/unbounded.hpp"
 #include "tests/clients/control/induction/servo_drive.hpp"
 
-namespace drivebench::control {
+namespace drivebench::control::decoupled_current_loop_test {
 namespace {
 
 /// Rates of the stator currents in the stator frame, (8.3)-(8.6) written out.
@@ -75,4 +75,4 @@ TEST(DecoupledCurrentLoop, AddsTheErrorTimesItsPole) {
 }
 
 }  // namespace
-}  // namespace drivebench::control
+}  // namespace drivebench::control::decoupled_current_loop_test

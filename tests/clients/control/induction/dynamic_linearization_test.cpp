@@ -9,7 +9,7 @@
 #include "clients/control/math/polynomial.hpp"
 #include "tests/clients/control/induction/servo_drive.hpp"
 
-namespace drivebench::control {
+namespace drivebench::control::dynamic_linearization_test {
 namespace {
 
 constexpr InductionMachineModel kServo = kServoMotor.machine;
@@ -164,4 +164,4 @@ TEST(FlatInduction, CurrentsAndFluxAreThoseOfTheFlatOutputs) {
 }
 
 }  // namespace
-}  // namespace drivebench::control
+}  // namespace drivebench::control::dynamic_linearization_test

@@ -9,7 +9,7 @@
 #include "clients/control/math/wrapped.hpp"
 #include "clients/control/presets/induction_servo.hpp"
 
-namespace drivebench::control {
+namespace drivebench::control::field_oriented_controller_test {
 namespace {
 
 const ControllerParameters& book() {
@@ -148,4 +148,4 @@ TEST(FieldOrientedController, FluxAngleIsCarriedOverLostSamples) {
 }
 
 }  // namespace
-}  // namespace drivebench::control
+}  // namespace drivebench::control::field_oriented_controller_test

@@ -7,7 +7,7 @@
 #include "tests/clients/control/induction/limit_speeds.hpp"
 #include "tests/clients/control/induction/servo_motor.hpp"
 
-namespace drivebench::control {
+namespace drivebench::control::flux_reference_test {
 namespace {
 
 constexpr double kPeriod_s = 250e-6;
@@ -91,4 +91,4 @@ TEST(FluxReference, OptimumFollowsItsCurrentAsTheMachineDoes) {
 }
 
 }  // namespace
-}  // namespace drivebench::control
+}  // namespace drivebench::control::flux_reference_test

@@ -7,7 +7,7 @@
 #include "clients/control/induction/torque_optimal_move.hpp"
 #include "tests/clients/control/induction/servo_motor.hpp"
 
-namespace drivebench::control {
+namespace drivebench::control::induction_demands_test {
 namespace {
 
 constexpr MoveAllowance kAmplifier = {.voltage_v = 80.0, .current_a = 6.0};
@@ -80,4 +80,4 @@ TEST(InductionDemands, SaysWhichMovesCannotBeMadeAndWhy) {
 }
 
 }  // namespace
-}  // namespace drivebench::control
+}  // namespace drivebench::control::induction_demands_test

@@ -8,7 +8,7 @@
 #include "plant/math/unbounded.hpp"
 #include "tests/clients/control/induction/servo_drive.hpp"
 
-namespace drivebench::control {
+namespace drivebench::control::induction_drive_test {
 namespace {
 
 constexpr double kPeriod_s = 125e-6;
@@ -86,4 +86,4 @@ TEST(Clipped, KeepsTheReportOfAnEarlierLimit) {
 }
 
 }  // namespace
-}  // namespace drivebench::control
+}  // namespace drivebench::control::induction_drive_test

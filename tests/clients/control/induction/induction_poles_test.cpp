@@ -6,7 +6,7 @@
 
 #include "tests/clients/control/induction/servo_motor.hpp"
 
-namespace drivebench::control {
+namespace drivebench::control::induction_poles_test {
 namespace {
 
 constexpr double kTolerance = 0.002;  // case 2
@@ -55,4 +55,4 @@ TEST(InductionPoles, OfInputOutputLinearisation) {
 }
 
 }  // namespace
-}  // namespace drivebench::control
+}  // namespace drivebench::control::induction_poles_test

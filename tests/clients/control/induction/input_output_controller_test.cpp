@@ -7,7 +7,7 @@
 #include "plant/math/unbounded.hpp"
 #include "tests/clients/control/induction/servo_drive.hpp"
 
-namespace drivebench::control {
+namespace drivebench::control::input_output_controller_test {
 namespace {
 
 constexpr InputOutputParameters kGains = {
@@ -120,4 +120,4 @@ TEST(InputOutputController, AngleLoopHasItsThreePoles) {
 }
 
 }  // namespace
-}  // namespace drivebench::control
+}  // namespace drivebench::control::input_output_controller_test

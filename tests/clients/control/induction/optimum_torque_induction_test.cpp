@@ -9,7 +9,7 @@
 #include "tests/clients/control/induction/limit_speeds.hpp"
 #include "tests/clients/control/induction/servo_motor.hpp"
 
-namespace drivebench::control {
+namespace drivebench::control::optimum_torque_induction_test {
 namespace {
 
 const SteadyInductionModel kServo = SteadyInductionModel::of(kServoMotor);
@@ -257,4 +257,4 @@ TEST(OptimumTorqueTable, AgreesWithTheSolver) {
 }
 
 }  // namespace
-}  // namespace drivebench::control
+}  // namespace drivebench::control::optimum_torque_induction_test

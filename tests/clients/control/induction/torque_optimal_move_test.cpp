@@ -6,7 +6,7 @@
 
 #include "tests/clients/control/induction/servo_motor.hpp"
 
-namespace drivebench::control {
+namespace drivebench::control::torque_optimal_move_test {
 namespace {
 
 constexpr TorqueMoveParameters kBookMove = {
@@ -99,4 +99,4 @@ TEST(TorqueOptimalMove, RampsMustFit) {
 }
 
 }  // namespace
-}  // namespace drivebench::control
+}  // namespace drivebench::control::torque_optimal_move_test

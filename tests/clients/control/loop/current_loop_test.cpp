@@ -4,7 +4,7 @@
 
 #include "plant/math/unbounded.hpp"
 
-namespace drivebench::control {
+namespace drivebench::control::current_loop_test {
 namespace {
 
 constexpr CurrentGains kBookGains = {.proportional_v_per_a = 6.4, .integral_v_per_as = 740.0};
@@ -51,4 +51,4 @@ TEST(CurrentLoop, LimitHoldsPerPhaseAndNotPerAxis) {
 }
 
 }  // namespace
-}  // namespace drivebench::control
+}  // namespace drivebench::control::current_loop_test

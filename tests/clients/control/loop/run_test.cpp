@@ -17,7 +17,7 @@
 #include "clients/control/presets/induction_servo.hpp"
 #include "clients/control/presets/presets.hpp"
 
-namespace drivebench::control {
+namespace drivebench::control::run_test {
 namespace {
 
 constexpr double kTurn = 2.0 * std::numbers::pi;
@@ -288,4 +288,4 @@ TEST(Run, FluxStandsAtItsRatedValueWhenTheMoveStarts) {
 }
 
 }  // namespace
-}  // namespace drivebench::control
+}  // namespace drivebench::control::run_test

@@ -6,7 +6,7 @@
 #include <limits>
 #include <stdexcept>
 
-namespace drivebench::control {
+namespace drivebench::control::limits_test {
 namespace {
 
 /// A current that rises by 10 A/s and a voltage that falls by 100 V/s.
@@ -64,4 +64,4 @@ TEST(Limits, ARefusalCarriesTheSentence) {
 }
 
 }  // namespace
-}  // namespace drivebench::control
+}  // namespace drivebench::control::limits_test

@@ -4,7 +4,7 @@
 
 #include <array>
 
-namespace drivebench::control {
+namespace drivebench::control::pole_placement_test {
 namespace {
 
 // Catches: a coefficient with a missing or double product: the sums of products of 2, 3 and 5 are known.
@@ -38,4 +38,4 @@ TEST(PolePlacement, JuryTellsRootsInsideTheUnitCircle) {
 }
 
 }  // namespace
-}  // namespace drivebench::control
+}  // namespace drivebench::control::pole_placement_test

@@ -4,7 +4,7 @@
 
 #include <array>
 
-namespace drivebench::control {
+namespace drivebench::control::polynomial_test {
 namespace {
 
 // Catches: coefficients read from the wrong end and lost complex roots: (x - 2)·(x² + 2x + 5), -1 ± 2j.
@@ -52,4 +52,4 @@ TEST(Polynomial, ADoubleRootStaysReal) {
 }
 
 }  // namespace
-}  // namespace drivebench::control
+}  // namespace drivebench::control::polynomial_test

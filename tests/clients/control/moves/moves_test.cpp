@@ -11,7 +11,7 @@
 #include "clients/control/moves/speed_ramp.hpp"
 #include "clients/control/moves/standard_inputs.hpp"
 
-namespace drivebench::control {
+namespace drivebench::control::moves_test {
 namespace {
 
 constexpr double kPi = std::numbers::pi;
@@ -164,4 +164,4 @@ TEST(SineTorqueMove, GivesTheCurrentOfASine) {
 }
 
 }  // namespace
-}  // namespace drivebench::control
+}  // namespace drivebench::control::moves_test

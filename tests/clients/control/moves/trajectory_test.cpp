@@ -6,7 +6,7 @@
 #include <limits>
 #include <numbers>
 
-namespace drivebench::control {
+namespace drivebench::control::trajectory_test {
 namespace {
 
 constexpr TrajectoryParameters kProfileA = {
@@ -78,4 +78,4 @@ TEST(Trajectory, NamesEveryProblemAtOnce) {
 }
 
 }  // namespace
-}  // namespace drivebench::control
+}  // namespace drivebench::control::trajectory_test

@@ -7,7 +7,7 @@
 #include "clients/control/presets/induction_servo.hpp"
 #include "protocols/nearest_name.hpp"
 
-namespace drivebench::control {
+namespace drivebench::control::presets_test {
 namespace {
 
 // Catches: a preset whose numbers break its own rules, two of the same name, and one that says nothing of
@@ -63,4 +63,4 @@ TEST(ControllerParameters, NamesEveryProblemAtOnce) {
 }
 
 }  // namespace
-}  // namespace drivebench::control
+}  // namespace drivebench::control::presets_test

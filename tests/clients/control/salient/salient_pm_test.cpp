@@ -7,7 +7,7 @@
 #include "clients/control/salient/least_current.hpp"
 #include "clients/control/salient/salient_pm_controller.hpp"
 
-namespace drivebench::control {
+namespace drivebench::control::salient_pm_test {
 namespace {
 
 SalientPmModel machine_with(double inductance_d_h, double inductance_q_h) {
@@ -97,4 +97,4 @@ TEST(SalientReferences, TheirVoltagesBalanceThePower) {
 }
 
 }  // namespace
-}  // namespace drivebench::control
+}  // namespace drivebench::control::salient_pm_test

@@ -6,7 +6,7 @@
 #include <limits>
 #include <numbers>
 
-namespace drivebench::control {
+namespace drivebench::control::bldc_controller_test {
 namespace {
 
 constexpr double kDegree_rad = std::numbers::pi / 180.0;
@@ -132,4 +132,4 @@ TEST(BldcController, FeedsTheEmfForward) {
 }
 
 }  // namespace
-}  // namespace drivebench::control
+}  // namespace drivebench::control::bldc_controller_test

@@ -10,7 +10,7 @@
 
 #include "tests/clients/control/synchronous/pm_transitions.hpp"
 
-namespace drivebench::control {
+namespace drivebench::control::optimum_torque_pm_test {
 namespace {
 
 constexpr PmMachineModel bm500(double torque_constant) {
@@ -214,4 +214,4 @@ TEST(PmTorqueTable, IsTheOptimumBetweenItsPointsToo) {
 }
 
 }  // namespace
-}  // namespace drivebench::control
+}  // namespace drivebench::control::optimum_torque_pm_test

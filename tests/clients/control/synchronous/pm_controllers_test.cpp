@@ -13,7 +13,7 @@
 #include "clients/control/synchronous/pm_speed_controller.hpp"
 #include "clients/control/synchronous/pm_voltage_controller.hpp"
 
-namespace drivebench::control {
+namespace drivebench::control::pm_controllers_test {
 namespace {
 
 constexpr PmMachineModel kStepper = {.pole_pairs = 50.0,
@@ -280,4 +280,4 @@ TEST(PmSpeedController, IsProportionalBelowItsLimits) {
 }
 
 }  // namespace
-}  // namespace drivebench::control
+}  // namespace drivebench::control::pm_controllers_test

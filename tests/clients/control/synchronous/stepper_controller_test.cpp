@@ -8,7 +8,7 @@
 #include "clients/control/moves/speed_steps.hpp"
 #include "clients/control/moves/step_train.hpp"
 
-namespace drivebench::control {
+namespace drivebench::control::stepper_controller_test {
 namespace {
 
 constexpr double kQuarter_rad = 0.5 * std::numbers::pi;
@@ -72,4 +72,4 @@ TEST(StepperController, StartsAtTheStepWhereTheRotorStands) {
 }
 
 }  // namespace
-}  // namespace drivebench::control
+}  // namespace drivebench::control::stepper_controller_test

@@ -7,7 +7,7 @@
 
 #include "clients/control/presets/presets.hpp"
 
-namespace drivebench::control {
+namespace drivebench::control::two_motor_controller_test {
 namespace {
 
 double across(const TwoPhase& u, double angle_rad) {
@@ -70,4 +70,4 @@ TEST(TwoMotors, NothingIsCommandedWhileTheRotorsComeToRest) {
 }
 
 }  // namespace
-}  // namespace drivebench::control
+}  // namespace drivebench::control::two_motor_controller_test

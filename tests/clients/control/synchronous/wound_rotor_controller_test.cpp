@@ -5,7 +5,7 @@
 #include <cmath>
 #include <numbers>
 
-namespace drivebench::control {
+namespace drivebench::control::wound_rotor_controller_test {
 namespace {
 
 constexpr WoundRotorModel kMotor = {.pole_pairs = 2.0,
@@ -120,4 +120,4 @@ TEST(WoundRotorParameters, LimitTheMutualInductance) {
 }
 
 }  // namespace
-}  // namespace drivebench::control
+}  // namespace drivebench::control::wound_rotor_controller_test

@@ -12,7 +12,7 @@
 #include "clients/control/wound_dc/series_dc_observer.hpp"
 #include "clients/control/wound_dc/shunt_dc_control.hpp"
 
-namespace drivebench::control {
+namespace drivebench::control::wound_dc_test {
 namespace {
 
 constexpr WoundDcModel kSeparate = {.armature_resistance_ohm = 3.0,
@@ -394,4 +394,4 @@ TEST(SeriesDcObserver, StandsStillWithoutCurrent) {
 }
 
 }  // namespace
-}  // namespace drivebench::control
+}  // namespace drivebench::control::wound_dc_test

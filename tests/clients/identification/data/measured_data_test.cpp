@@ -6,7 +6,7 @@
 #include <random>
 #include <string>
 
-namespace drivebench::identification {
+namespace drivebench::identification::measured_data_test {
 namespace {
 
 std::string refusal(std::string_view text, const CsvOptions& options = {}) {
@@ -99,4 +99,4 @@ TEST(MeasuredData, RandomFilesAreReadOrRefused) {
 }
 
 }  // namespace
-}  // namespace drivebench::identification
+}  // namespace drivebench::identification::measured_data_test

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <random>
 
-namespace drivebench::identification {
+namespace drivebench::identification::noise_test {
 namespace {
 
 /// A sine of 100 samples with an edge, and noise of this rms.
@@ -37,4 +37,4 @@ TEST(WhiteNoise, OfAConverterIsThatOfItsSteps) {
 }
 
 }  // namespace
-}  // namespace drivebench::identification
+}  // namespace drivebench::identification::noise_test

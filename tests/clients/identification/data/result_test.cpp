@@ -7,7 +7,7 @@
 
 #include "server/config/config.hpp"
 
-namespace drivebench::identification {
+namespace drivebench::identification::result_test {
 namespace {
 
 Result some_result() {
@@ -180,4 +180,4 @@ TEST(IdentificationResult, ACurveThatFallsIsNoMotor) {
 }
 
 }  // namespace
-}  // namespace drivebench::identification
+}  // namespace drivebench::identification::result_test

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <numbers>
 
-namespace drivebench::identification {
+namespace drivebench::identification::signals_test {
 namespace {
 
 Series sine(double rad_per_sample, double phase_rad, std::size_t count = 400) {
@@ -82,4 +82,4 @@ TEST(Signals, CountsBecomeAngles) {
 }
 
 }  // namespace
-}  // namespace drivebench::identification
+}  // namespace drivebench::identification::signals_test

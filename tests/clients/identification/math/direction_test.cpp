@@ -4,7 +4,7 @@
 
 #include <complex>
 
-namespace drivebench::identification {
+namespace drivebench::identification::direction_test {
 namespace {
 
 // Angles on both sides of the quarter of a radian where the library takes over, from turns away as well.
@@ -20,4 +20,4 @@ TEST(Direction, NearAndFarAnglesAreRight) {
 }
 
 }  // namespace
-}  // namespace drivebench::identification
+}  // namespace drivebench::identification::direction_test

@@ -7,7 +7,7 @@
 
 #include "clients/identification/math/real_roots.hpp"
 
-namespace drivebench::identification {
+namespace drivebench::identification::elimination_test {
 namespace {
 
 using Complex = std::complex<double>;
@@ -102,4 +102,4 @@ TEST(RealRoots, ADoubleRootIsReported) {
 }
 
 }  // namespace
-}  // namespace drivebench::identification
+}  // namespace drivebench::identification::elimination_test

@@ -9,7 +9,7 @@
 #include <random>
 #include <vector>
 
-namespace drivebench::identification {
+namespace drivebench::identification::filters_test {
 namespace {
 
 constexpr double kPi = std::numbers::pi;
@@ -151,4 +151,4 @@ TEST(Filters, ACornerAboveHalfTheSamplingRateIsRefused) {
 }
 
 }  // namespace
-}  // namespace drivebench::identification
+}  // namespace drivebench::identification::filters_test

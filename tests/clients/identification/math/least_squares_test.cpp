@@ -6,7 +6,7 @@
 #include <cmath>
 #include <random>
 
-namespace drivebench::identification {
+namespace drivebench::identification::least_squares_test {
 namespace {
 
 // A line through points with a known answer: estimate, E^2 and both indices by hand. R_W = [4 6; 6 14], E^2
@@ -111,4 +111,4 @@ TEST(LeastSquares, TooFewOrBrokenDataAreRefused) {
 }
 
 }  // namespace
-}  // namespace drivebench::identification
+}  // namespace drivebench::identification::least_squares_test

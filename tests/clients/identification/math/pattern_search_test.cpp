@@ -8,7 +8,7 @@
 #include <cmath>
 #include <set>
 
-namespace drivebench::identification {
+namespace drivebench::identification::pattern_search_test {
 namespace {
 
 double square(double x) {
@@ -65,4 +65,4 @@ TEST(PatternSearch, ComesBackFromBeyondALimit) {
 }
 
 }  // namespace
-}  // namespace drivebench::identification
+}  // namespace drivebench::identification::pattern_search_test

@@ -7,7 +7,7 @@
 #include <tuple>
 #include <vector>
 
-namespace drivebench::identification {
+namespace drivebench::identification::blind_test {
 namespace {
 
 // One motor of each kind: its wiring is found and every parameter stated. Catches: a blind run that tells the
@@ -61,4 +61,4 @@ TEST(Blind, TheScoreCountsWhatIsStatedAndHeld) {
 }
 
 }  // namespace
-}  // namespace drivebench::identification
+}  // namespace drivebench::identification::blind_test

@@ -12,7 +12,7 @@
 #include "clients/identification/data/noise.hpp"
 #include "tests/clients/identification/monte_carlo/random_motors.hpp"
 
-namespace drivebench::identification {
+namespace drivebench::identification::monte_carlo_test {
 namespace {
 
 /// The motors that the table shows one by one, run once for all tests.
@@ -139,4 +139,4 @@ TEST(MonteCarlo, DifferencesAreFound) {
 }
 
 }  // namespace
-}  // namespace drivebench::identification
+}  // namespace drivebench::identification::monte_carlo_test

@@ -9,7 +9,7 @@
 #include "clients/models/bldc_machine.hpp"
 #include "tests/clients/identification/bench_data.hpp"
 
-namespace drivebench::identification {
+namespace drivebench::identification::bldc_motor_test {
 namespace {
 
 // The motor of chapter 10 on voltages in the shape of its emf, 25 +- 10 V at 7 Hz, true angle, 20 kHz: 1 % of
@@ -60,4 +60,4 @@ TEST(BldcMotor, TheEmfHasItsCorners) {
 }
 
 }  // namespace
-}  // namespace drivebench::identification
+}  // namespace drivebench::identification::bldc_motor_test

@@ -8,7 +8,7 @@
 
 #include "tests/clients/identification/bench_data.hpp"
 
-namespace drivebench::identification {
+namespace drivebench::identification::classical_tests_test {
 namespace {
 
 /// The power analyser on im-b at 208 V, held or turned at the speed of the field.
@@ -101,4 +101,4 @@ TEST(ClassicalTests, AStepAtStandstillGivesResistanceAndInductance) {
 }
 
 }  // namespace
-}  // namespace drivebench::identification
+}  // namespace drivebench::identification::classical_tests_test

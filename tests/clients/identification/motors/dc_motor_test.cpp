@@ -10,7 +10,7 @@
 
 #include "tests/clients/identification/bench_data.hpp"
 
-namespace drivebench::identification {
+namespace drivebench::identification::dc_motor_test {
 namespace {
 
 constexpr double kPi = std::numbers::pi;
@@ -138,4 +138,4 @@ TEST(DcMotor, UnusableDataAreRefused) {
 }
 
 }  // namespace
-}  // namespace drivebench::identification
+}  // namespace drivebench::identification::dc_motor_test

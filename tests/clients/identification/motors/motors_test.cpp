@@ -9,7 +9,7 @@
 
 #include "clients/identification/named_experiments.hpp"
 
-namespace drivebench::identification {
+namespace drivebench::identification::motors_test {
 namespace {
 
 const BenchParameters kInduction = {{"machine.pole_pairs", 2},
@@ -182,4 +182,4 @@ TEST(Motors, ANamedExperimentSetsWindowLoadAndFilters) {
 }
 
 }  // namespace
-}  // namespace drivebench::identification
+}  // namespace drivebench::identification::motors_test

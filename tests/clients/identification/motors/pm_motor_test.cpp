@@ -9,7 +9,7 @@
 #include "plant/math/frames.hpp"
 #include "tests/clients/identification/bench_data.hpp"
 
-namespace drivebench::identification {
+namespace drivebench::identification::pm_motor_test {
 namespace {
 
 constexpr double kPeriod = 2e-5;
@@ -186,4 +186,4 @@ TEST(PmMotor, AConstantSpeedShowsNoMechanics) {
 }
 
 }  // namespace
-}  // namespace drivebench::identification
+}  // namespace drivebench::identification::pm_motor_test

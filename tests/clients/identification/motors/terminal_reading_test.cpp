@@ -11,7 +11,7 @@
 
 #include "clients/identification/motors/classical_tests.hpp"
 
-namespace drivebench::identification {
+namespace drivebench::identification::terminal_reading_test {
 namespace {
 
 constexpr double kTurn = 2.0 * std::numbers::pi;
@@ -190,4 +190,4 @@ TEST(TerminalReading, RefusesWhatIsNotASteadyState) {
 }
 
 }  // namespace
-}  // namespace drivebench::identification
+}  // namespace drivebench::identification::terminal_reading_test

@@ -4,7 +4,7 @@
 
 #include <cmath>
 
-namespace drivebench::identification {
+namespace drivebench::identification::terminal_voltages_test {
 namespace {
 
 MeasuredData record(double (*value)(int)) {
@@ -50,4 +50,4 @@ TEST(TerminalVoltages, ThinnedVoltagesKeepTheirMeanAndTheirInstant) {
 }
 
 }  // namespace
-}  // namespace drivebench::identification
+}  // namespace drivebench::identification::terminal_voltages_test

@@ -6,7 +6,7 @@
 #include <random>
 #include <vector>
 
-namespace drivebench::identification {
+namespace drivebench::identification::gauss_newton_test {
 namespace {
 
 constexpr int kRows = 6400;
@@ -115,4 +115,4 @@ TEST(GaussNewton, ASearchEndsAtTheBottomOfAValley) {
 }
 
 }  // namespace
-}  // namespace drivebench::identification
+}  // namespace drivebench::identification::gauss_newton_test

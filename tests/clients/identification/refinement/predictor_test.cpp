@@ -8,7 +8,7 @@
 #include "clients/identification/refinement/rounds.hpp"
 #include "tests/clients/identification/monte_carlo/random_motors.hpp"
 
-namespace drivebench::identification {
+namespace drivebench::identification::predictor_test {
 namespace {
 
 /// The column of each unknown by differences of whole runs, less that of the variational equations, over its
@@ -80,4 +80,4 @@ TEST(Predictor, ItsDerivativesAreThoseOfItsInnovations) {
 }
 
 }  // namespace
-}  // namespace drivebench::identification
+}  // namespace drivebench::identification::predictor_test

@@ -9,7 +9,7 @@
 #include "clients/identification/identify.hpp"
 #include "tests/clients/identification/bench_data.hpp"
 
-namespace drivebench::identification {
+namespace drivebench::identification::refinement_test {
 namespace {
 
 constexpr double kTurn = 2.0 * std::numbers::pi;
@@ -193,4 +193,4 @@ TEST(Refinement, TheFilterOfTheShaftSuitsTheEncoder) {
 }
 
 }  // namespace
-}  // namespace drivebench::identification
+}  // namespace drivebench::identification::refinement_test

@@ -13,7 +13,7 @@
 #include "tests/clients/identification/monte_carlo/random_motors.hpp"
 #include "tests/clients/identification/wiring/crossed_wires.hpp"
 
-namespace drivebench::identification {
+namespace drivebench::identification::salient_test {
 namespace {
 
 const MotorDraw& draw_of(bool salient) {
@@ -121,4 +121,4 @@ TEST(SalientRotor, AnotherMotorIsRefused) {
 }
 
 }  // namespace
-}  // namespace drivebench::identification
+}  // namespace drivebench::identification::salient_test

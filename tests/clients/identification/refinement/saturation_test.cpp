@@ -11,7 +11,7 @@
 #include "clients/identification/resimulation.hpp"
 #include "tests/clients/identification/monte_carlo/random_motors.hpp"
 
-namespace drivebench::identification {
+namespace drivebench::identification::saturation_test {
 namespace {
 
 /// Motor `number` of the saturated draw, started at a part of the flux.
@@ -235,4 +235,4 @@ TEST(Saturation, TheTestTellsABendFromNoise) {
 }
 
 }  // namespace
-}  // namespace drivebench::identification
+}  // namespace drivebench::identification::saturation_test

@@ -9,7 +9,7 @@
 #include "clients/identification/resimulation.hpp"
 #include "tests/clients/identification/monte_carlo/random_motors.hpp"
 
-namespace drivebench::identification {
+namespace drivebench::identification::sensor_errors_test {
 namespace {
 
 /// Motor 2 of a kind with encoder and converters of 12 bits, white noise of one step.
@@ -163,4 +163,4 @@ TEST(Refinement, ALongRecordIsCutAndSaysSo) {
 }
 
 }  // namespace
-}  // namespace drivebench::identification
+}  // namespace drivebench::identification::sensor_errors_test

@@ -15,7 +15,7 @@
 #include "clients/identification/identify.hpp"
 #include "tests/clients/identification/monte_carlo/random_motors.hpp"
 
-namespace drivebench::identification {
+namespace drivebench::identification::suspects_test {
 namespace {
 
 constexpr Eigen::Index kRows = 1280;
@@ -205,4 +205,4 @@ TEST(Suspects, AMotorWithTheNoiseOfItsSensorsIsCertified) {
 }
 
 }  // namespace
-}  // namespace drivebench::identification
+}  // namespace drivebench::identification::suspects_test

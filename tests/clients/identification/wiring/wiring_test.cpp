@@ -11,7 +11,7 @@
 #include "tests/clients/identification/monte_carlo/random_motors.hpp"
 #include "tests/clients/identification/wiring/crossed_wires.hpp"
 
-namespace drivebench::identification {
+namespace drivebench::identification::wiring_test {
 namespace {
 
 constexpr double kTurn = 2.0 * std::numbers::pi;
@@ -212,4 +212,4 @@ TEST(Wiring, APhasorLeavesPolePairsAndShiftOpen) {
 }
 
 }  // namespace
-}  // namespace drivebench::identification
+}  // namespace drivebench::identification::wiring_test

@@ -6,7 +6,7 @@
 
 #include "clients/link/common/address.hpp"
 
-namespace drivebench::link {
+namespace drivebench::link::can_address_test {
 namespace {
 
 // Catches: a back end, channel or default port that is taken apart at the wrong place.
@@ -78,4 +78,4 @@ TEST(CanAddress, RefusesInvalidTexts) {
 }
 
 }  // namespace
-}  // namespace drivebench::link
+}  // namespace drivebench::link::can_address_test

@@ -14,7 +14,7 @@
 
 #include "clients/link/common/address.hpp"
 
-namespace drivebench::link {
+namespace drivebench::link::can_bus_test {
 namespace {
 
 using namespace std::chrono_literals;
@@ -157,4 +157,4 @@ TEST(CanBus, AMissingTransportIsAConnectError) {
 }
 
 }  // namespace
-}  // namespace drivebench::link
+}  // namespace drivebench::link::can_bus_test

@@ -9,7 +9,7 @@
 
 #include "tests/clients/link/can/fake_can_bench.hpp"
 
-namespace drivebench::link {
+namespace drivebench::link::can_link_test {
 namespace {
 
 using namespace std::chrono_literals;
@@ -380,4 +380,4 @@ TEST_P(CanLinkOf, RefusesRequestsWithoutAFrame) {
 }
 
 }  // namespace
-}  // namespace drivebench::link
+}  // namespace drivebench::link::can_link_test

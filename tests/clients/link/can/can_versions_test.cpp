@@ -14,7 +14,7 @@
 #include "clients/link/can/can_link.hpp"
 #include "tests/clients/link/can/fake_can_bench.hpp"
 
-namespace drivebench::link {
+namespace drivebench::link::can_versions_test {
 namespace {
 
 constexpr CanLinkOptions kQuick = {.deadline = std::chrono::milliseconds(30)};
@@ -95,4 +95,4 @@ TEST(CanVersions, ALinkSpeaksToABenchWithTheIdentifiersOfCanopen) {
 }
 
 }  // namespace
-}  // namespace drivebench::link
+}  // namespace drivebench::link::can_versions_test

@@ -8,7 +8,7 @@
 
 #include <string>
 
-namespace drivebench::link {
+namespace drivebench::link::address_test {
 namespace {
 
 using namespace std::chrono_literals;
@@ -105,4 +105,4 @@ TEST(Address, ConnectsOnlyToAListeningSocket) {
 }
 
 }  // namespace
-}  // namespace drivebench::link
+}  // namespace drivebench::link::address_test

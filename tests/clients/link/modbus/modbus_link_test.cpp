@@ -15,7 +15,7 @@
 #include "clients/link/common/address.hpp"
 #include "protocols/modbus/register_map.hpp"
 
-namespace drivebench::link {
+namespace drivebench::link::modbus_link_test {
 namespace {
 
 using namespace std::chrono_literals;
@@ -278,4 +278,4 @@ TEST(ModbusLink, AnotherDeviceOrASilentOneIsAnError) {
 }
 
 }  // namespace
-}  // namespace drivebench::link
+}  // namespace drivebench::link::modbus_link_test

@@ -14,7 +14,7 @@
 
 #include "clients/link/common/address.hpp"
 
-namespace drivebench::link {
+namespace drivebench::link::shared_memory_test {
 namespace {
 
 using namespace std::chrono_literals;
@@ -121,4 +121,4 @@ TEST(SharedMemory, SHM_04_NoSleepIsForEver) {
 }
 
 }  // namespace
-}  // namespace drivebench::link
+}  // namespace drivebench::link::shared_memory_test

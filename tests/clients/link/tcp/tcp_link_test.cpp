@@ -11,7 +11,7 @@
 
 #include "tests/clients/link/tcp/fake_peer.hpp"
 
-namespace drivebench::link {
+namespace drivebench::link::tcp_link_test {
 namespace {
 
 using namespace std::chrono_literals;
@@ -357,4 +357,4 @@ TEST(Link, TakesAnswersUpToTheCap) {
 }
 
 }  // namespace
-}  // namespace drivebench::link
+}  // namespace drivebench::link::tcp_link_test

@@ -10,7 +10,7 @@
 #include "tests/server/endpoints/can/can_endpoint_test.hpp"
 #include "tests/server/endpoints/simulated_clock.hpp"
 
-namespace drivebench::can {
+namespace drivebench::can::can_conflict_test {
 namespace {
 
 using namespace std::chrono_literals;
@@ -212,4 +212,4 @@ TEST_F(ConflictTest, CAN_15_WithTheIdentifiersOfCanopenAScanIsAPause) {
 }
 
 }  // namespace
-}  // namespace drivebench::can
+}  // namespace drivebench::can::can_conflict_test

@@ -9,7 +9,7 @@
 
 #include "tests/server/endpoints/can/can_endpoint_test.hpp"
 
-namespace drivebench::can {
+namespace drivebench::can::can_endpoint_test {
 namespace {
 
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
@@ -216,4 +216,4 @@ TEST(CanEndpoint, CAN_02_CAN_03_ALinkThatComesBackIsUsedAgain) {
 }
 
 }  // namespace
-}  // namespace drivebench::can
+}  // namespace drivebench::can::can_endpoint_test

@@ -15,7 +15,7 @@
 #include "server/endpoints/can/endpoint.hpp"
 #include "tests/server/endpoints/can/can_endpoint_test.hpp"
 
-namespace drivebench::can {
+namespace drivebench::can::can_lease_test {
 namespace {
 
 // Catches: two controllers at once, on one bus or across transports; a lease number that two
@@ -246,4 +246,4 @@ TEST(CanLease, LostControllersDoNotFillTheLog) {
 }
 
 }  // namespace
-}  // namespace drivebench::can
+}  // namespace drivebench::can::can_lease_test

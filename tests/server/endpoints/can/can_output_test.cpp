@@ -6,7 +6,7 @@
 #include "tests/protocols/can/can_edge.hpp"
 #include "tests/server/endpoints/can/can_endpoint_test.hpp"
 
-namespace drivebench::can {
+namespace drivebench::can::can_output_test {
 namespace {
 
 // Catches: a bench that is silent at start, or sends another frame before the boot-up.
@@ -141,4 +141,4 @@ TEST(CanOutput, SyncNamesTheTickOfItsSamples) {
 }
 
 }  // namespace
-}  // namespace drivebench::can
+}  // namespace drivebench::can::can_output_test

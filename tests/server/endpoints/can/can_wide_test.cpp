@@ -8,7 +8,7 @@
 #include "plant/injected_faults.hpp"
 #include "tests/server/endpoints/can/can_endpoint_test.hpp"
 
-namespace drivebench::can {
+namespace drivebench::can::can_wide_test {
 namespace {
 
 Profile profile_of(bool fd) {
@@ -265,4 +265,4 @@ TEST_P(WideAxis, ANarrowAxisKeepsItsFramesBesideAWideOne) {
 }
 
 }  // namespace
-}  // namespace drivebench::can
+}  // namespace drivebench::can::can_wide_test

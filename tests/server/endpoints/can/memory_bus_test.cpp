@@ -4,7 +4,7 @@
 
 #include "tests/server/endpoints/can/memory_bus.hpp"
 
-namespace drivebench::can {
+namespace drivebench::can::memory_bus_test {
 namespace {
 
 Frame data_frame(std::uint32_t id, std::uint8_t first = 0) {
@@ -172,4 +172,4 @@ TEST_F(MemoryBusTest, PortsAndHandlersOutliveEachOther) {
 }
 
 }  // namespace
-}  // namespace drivebench::can
+}  // namespace drivebench::can::memory_bus_test

@@ -6,7 +6,7 @@
 #include <map>
 #include <random>
 
-namespace drivebench::can {
+namespace drivebench::can::socketcan_test {
 namespace {
 
 // Catches: sizes, flags or bytes of a frame changed on the way, in either direction.
@@ -345,4 +345,4 @@ TEST(SocketCanFilters, AreExactForAnySet) {
 }
 
 }  // namespace
-}  // namespace drivebench::can
+}  // namespace drivebench::can::socketcan_test

@@ -10,7 +10,7 @@
 
 #include "server/host/asio.hpp"
 
-namespace drivebench::can {
+namespace drivebench::can::text_listener_test {
 namespace {
 
 // Catches: a log that grows by ten lines a second while no descriptors are left for new clients.
@@ -43,4 +43,4 @@ TEST(TextListener, ClientsThatCannotBeAcceptedDoNotFillTheLog) {
 }
 
 }  // namespace
-}  // namespace drivebench::can
+}  // namespace drivebench::can::text_listener_test

@@ -11,7 +11,7 @@
 #include "server/endpoints/can/buses/send_queue.hpp"
 #include "server/host/asio.hpp"
 
-namespace drivebench::can {
+namespace drivebench::can::virtual_bus_test {
 namespace {
 
 // A wait of this length means that the test hangs.
@@ -200,4 +200,4 @@ TEST(VirtualBus, OpensLaterIfItIsNotRequired) {
 }
 
 }  // namespace
-}  // namespace drivebench::can
+}  // namespace drivebench::can::virtual_bus_test

@@ -5,7 +5,7 @@
 #include "plant/faults.hpp"
 #include "tests/server/endpoints/modbus/modbus_bench.hpp"
 
-namespace drivebench::modbus {
+namespace drivebench::modbus::desk_test {
 namespace {
 
 constexpr Visitor kClient = 1;
@@ -214,4 +214,4 @@ TEST(ModbusDesk, AnExchangeReadsWhatTheRegistersShow) {
 }
 
 }  // namespace
-}  // namespace drivebench::modbus
+}  // namespace drivebench::modbus::desk_test

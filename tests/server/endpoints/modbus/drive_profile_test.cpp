@@ -2,7 +2,7 @@
 #include "plant/faults.hpp"
 #include "tests/server/endpoints/modbus/modbus_bench.hpp"
 
-namespace drivebench::modbus {
+namespace drivebench::modbus::drive_profile_test {
 namespace {
 
 // Catches: transitions of CiA 402 that are missing or too many; a motor that starts on a control word left
@@ -151,4 +151,4 @@ TEST(Modbus, AFaultClearedByRegisterEndsTheStateFault) {
 }
 
 }  // namespace
-}  // namespace drivebench::modbus
+}  // namespace drivebench::modbus::drive_profile_test

@@ -8,7 +8,7 @@
 
 #include "tests/server/endpoints/modbus/modbus_bench.hpp"
 
-namespace drivebench::modbus {
+namespace drivebench::modbus::keys_test {
 namespace {
 
 using namespace std::chrono_literals;
@@ -152,4 +152,4 @@ TEST_F(Keys, SEC_07_ATakeoverByTheKeyIsLogged) {
 }
 
 }  // namespace
-}  // namespace drivebench::modbus
+}  // namespace drivebench::modbus::keys_test

@@ -4,7 +4,7 @@
 #include "plant/faults.hpp"
 #include "tests/server/endpoints/modbus/modbus_bench.hpp"
 
-namespace drivebench::modbus {
+namespace drivebench::modbus::lease_test {
 namespace {
 
 constexpr Owner kTcpSession = 1'000'000;
@@ -356,4 +356,4 @@ TEST(Modbus, AFreeRunTakesNoController) {
 }
 
 }  // namespace
-}  // namespace drivebench::modbus
+}  // namespace drivebench::modbus::lease_test

@@ -3,7 +3,7 @@
 
 #include "tests/server/endpoints/modbus/modbus_bench.hpp"
 
-namespace drivebench::modbus {
+namespace drivebench::modbus::limits_test {
 namespace {
 
 /// Number of lines with these words.
@@ -138,4 +138,4 @@ TEST(Modbus, LIMIT_06_JustBelowTheRateEverythingIsAnswered) {
 }
 
 }  // namespace
-}  // namespace drivebench::modbus
+}  // namespace drivebench::modbus::limits_test

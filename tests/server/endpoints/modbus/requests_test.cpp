@@ -4,7 +4,7 @@
 
 #include "tests/server/endpoints/modbus/modbus_bench.hpp"
 
-namespace drivebench::modbus {
+namespace drivebench::modbus::requests_test {
 namespace {
 
 // ---- what the map of version 1 must look like, written down once more ----
@@ -343,4 +343,4 @@ TEST(Modbus, WithoutPermissionEveryRegisterIsReadOnly) {
 }
 
 }  // namespace
-}  // namespace drivebench::modbus
+}  // namespace drivebench::modbus::requests_test

@@ -4,7 +4,7 @@
 
 #include "tests/server/endpoints/modbus/modbus_bench.hpp"
 
-namespace drivebench::modbus {
+namespace drivebench::modbus::stream_test {
 namespace {
 
 const Bytes kReadMarker = pdu_of(3, {0, 1});
@@ -267,4 +267,4 @@ TEST(Modbus, MB_14_ManyDescriptorsDoNoHarm) {
 }
 
 }  // namespace
-}  // namespace drivebench::modbus
+}  // namespace drivebench::modbus::stream_test

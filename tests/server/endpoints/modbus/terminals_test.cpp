@@ -7,7 +7,7 @@
 #include "plant/parameters/parameters.hpp"
 #include "tests/server/endpoints/modbus/modbus_bench.hpp"
 
-namespace drivebench::modbus {
+namespace drivebench::modbus::terminals_test {
 namespace {
 
 float real_at(const Words& words, std::size_t at) {
@@ -246,4 +246,4 @@ TEST(ModbusTerminals, HallLinesAndInjectedFaultsAreDiscreteInputs) {
 }
 
 }  // namespace
-}  // namespace drivebench::modbus
+}  // namespace drivebench::modbus::terminals_test

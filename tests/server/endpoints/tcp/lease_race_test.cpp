@@ -13,7 +13,7 @@
 #include "server/endpoints/tcp/stream_server.hpp"
 #include "tests/server/recording/run_config.hpp"
 
-namespace drivebench {
+namespace drivebench::lease_race_test {
 namespace {
 
 constexpr std::size_t kClients = 4;
@@ -155,4 +155,4 @@ TEST(LeaseRace, OWN_01_TwoThreadsNeverHoldTheAxisAtTheSameTime) {
 }
 
 }  // namespace
-}  // namespace drivebench
+}  // namespace drivebench::lease_race_test

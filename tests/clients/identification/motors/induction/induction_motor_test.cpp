@@ -11,7 +11,7 @@
 #include "clients/identification/motors/induction/induction_regressor.hpp"
 #include "tests/clients/identification/bench_data.hpp"
 
-namespace drivebench::identification {
+namespace drivebench::identification::induction_motor_test {
 namespace {
 
 constexpr double kSigma = 1.0 - 0.64 * 0.64 / (0.67 * 0.67);
@@ -228,4 +228,4 @@ TEST(InductionMotor, TheVerdictNamesAParameterHiddenByNoise) {
 }
 
 }  // namespace
-}  // namespace drivebench::identification
+}  // namespace drivebench::identification::induction_motor_test

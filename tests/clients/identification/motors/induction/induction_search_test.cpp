@@ -9,7 +9,7 @@
 #include "clients/identification/motors/induction/induction_polynomial.hpp"
 #include "clients/identification/motors/induction/induction_regressor.hpp"
 
-namespace drivebench::identification {
+namespace drivebench::identification::induction_search_test {
 namespace {
 
 /// Data of a motor whose signals need not obey its equations: rows around a known K, with an error.
@@ -219,4 +219,4 @@ TEST(InductionSearch, TheEliminationOfTheBookHasTheSameRoots) {
 }
 
 }  // namespace
-}  // namespace drivebench::identification
+}  // namespace drivebench::identification::induction_search_test

@@ -11,7 +11,7 @@
 
 #include "tests/clients/identification/bench_data.hpp"
 
-namespace drivebench::identification {
+namespace drivebench::identification::resistance_tracking_test {
 namespace {
 
 constexpr KnownInductances kKnown = {.stator_inductance_h = 0.67,
@@ -227,4 +227,4 @@ TEST(Resistances, ATrackerWithoutInductancesIsRefused) {
 }
 
 }  // namespace
-}  // namespace drivebench::identification
+}  // namespace drivebench::identification::resistance_tracking_test

@@ -9,7 +9,7 @@
 #include <limits>
 #include <vector>
 
-namespace drivebench {
+namespace drivebench::capture_test {
 namespace {
 
 const Signal* signal(std::string_view name) {
@@ -229,4 +229,4 @@ TEST_F(CaptureTest, ThePoolCountsWhatAllMayTake) {
 }
 
 }  // namespace
-}  // namespace drivebench
+}  // namespace drivebench::capture_test

@@ -7,7 +7,7 @@
 
 #include "tests/server/recording/run_config.hpp"
 
-namespace drivebench {
+namespace drivebench::audience_test {
 namespace {
 
 // Catches: rings without a reader that every tick goes on filling, one for each viewer there has been.
@@ -47,4 +47,4 @@ TEST(Audience, LIMIT_03_FeedsOfManyDecimationsHaveAnEnd) {
 }
 
 }  // namespace
-}  // namespace drivebench
+}  // namespace drivebench::audience_test

@@ -14,7 +14,7 @@
 
 #include "tests/server/endpoints/simulated_clock.hpp"
 
-namespace drivebench {
+namespace drivebench::outbox_test {
 namespace {
 
 using namespace std::chrono_literals;
@@ -178,4 +178,4 @@ TEST(Outbox, LIMIT_04_APauseOfTheServerIsNoSilenceOfThePeer) {
 }
 
 }  // namespace
-}  // namespace drivebench
+}  // namespace drivebench::outbox_test

@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <vector>
 
-namespace drivebench {
+namespace drivebench::sample_feed_test {
 namespace {
 
 constexpr std::size_t kAtMost = 32;
@@ -75,4 +75,4 @@ TEST(SampleFeed, SamplesOfUnseenTicksCountAsLost) {
 }
 
 }  // namespace
-}  // namespace drivebench
+}  // namespace drivebench::sample_feed_test

@@ -11,7 +11,7 @@
 #include "tests/fuzz/request_program.hpp"
 #include "tests/fuzz/request_promises.hpp"
 
-namespace drivebench {
+namespace drivebench::request_bounds_test {
 namespace {
 
 using google::protobuf::Descriptor;
@@ -223,4 +223,4 @@ TEST(RequestBounds, TCP_05_ASearchFindsNoFrameThatTakesMuch) {
 }
 
 }  // namespace
-}  // namespace drivebench
+}  // namespace drivebench::request_bounds_test

@@ -10,7 +10,7 @@
 #include "server/endpoints/tcp/stream_server.hpp"
 #include "tests/server/recording/run_config.hpp"
 
-namespace drivebench {
+namespace drivebench::session_turns_test {
 namespace {
 
 /// A client on a socket of its own, which does not wait for answers.
@@ -121,4 +121,4 @@ TEST_F(SessionTurns, TCP_05_ParametersAreDescribedOnceEach) {
 }
 
 }  // namespace
-}  // namespace drivebench
+}  // namespace drivebench::session_turns_test
