@@ -110,7 +110,7 @@ std::string signal_line(const Field& field, const Profile& profile, const Messag
          (row.sender == Sender::kBench ? " Controller\n" : " Bench\n");
 }
 
-std::string no_value_text(const Field& field) {
+std::string no_value_words(const Field& field) {
   if (field.encoding == Encoding::kScaled) return "; the lowest number: no value";
   if (field.encoding == Encoding::kUScaled) return "; all ones: no value";
   return field.encoding == Encoding::kFloat ? "; NaN: no value" : "";
@@ -139,7 +139,7 @@ std::string comments(const Entry& entry, std::span<const BitWord> words) {
   std::string text = "CM_ BO_ " + entry.id + " " + quoted(about) + ";\n";
   for (const Field& field : fields_of(row)) {
     text += "CM_ SG_ " + entry.id + " " + std::string(field.name) + " " +
-            quoted(std::string(field.meaning) + bits_text(field, words) + no_value_text(field)) + ";\n";
+            quoted(std::string(field.meaning) + bits_text(field, words) + no_value_words(field)) + ";\n";
   }
   return text;
 }

@@ -1,7 +1,5 @@
 #include "protocols/mcap/time_base.hpp"
 
-#include <fmt/core.h>
-
 #include <algorithm>
 #include <array>
 #include <charconv>
@@ -63,7 +61,8 @@ std::string utc_text(std::int64_t unix_ns) {
   gmtime_r(&second, &utc);
   std::array<char, 32> text{};
   const std::size_t size = std::strftime(text.data(), text.size(), "%Y-%m-%dT%H:%M:%S", &utc);
-  return fmt::format("{}.{:06}Z", std::string_view(text.data(), size), below_second_ns / 1000);
+  const std::string microseconds = std::to_string(1'000'000 + below_second_ns / 1000).substr(1);
+  return std::string(text.data(), size) + "." + microseconds + "Z";
 }
 
 }  // namespace drivebench

@@ -1,5 +1,6 @@
 """Shared by the tests of the server program."""
 import json
+import os
 import pathlib
 import resource
 import shutil
@@ -41,6 +42,11 @@ over_current_a = 20.0
 [axis.encoder]
 counts_per_revolution = 4096
 """
+
+
+def repetitions(of_an_ordinary_build):
+    """So many in an ordinary build, a tenth of them under a sanitizer, which finds a mistake in memory in these, too."""
+    return of_an_ordinary_build // 10 if "DRIVEBENCH_SANITIZED" in os.environ else of_an_ordinary_build
 
 
 def until(condition, what):

@@ -25,7 +25,7 @@ InductionMotorFile read_motor(const std::string& choice) {
   }
 }
 
-void write(const std::string& file, const std::string& text) {
+void write_plot(const std::string& file, const std::string& text) {
   Output out(file);
   out.write(text);
   out.flush();
@@ -101,8 +101,8 @@ int run_steady_state(const SteadyStateOptions& options) {
   }
   const std::string title =
       fmt::format("{}: {:g} V, {:g} Hz", file.name, options.voltage_v, options.frequency_hz);
-  if (!options.plot_file.empty()) write(options.plot_file, steady_state_plot(circuit, title));
-  if (!options.circle_file.empty()) write(options.circle_file, circle_diagram(circuit, points, title));
+  if (!options.plot_file.empty()) write_plot(options.plot_file, steady_state_plot(circuit, title));
+  if (!options.circle_file.empty()) write_plot(options.circle_file, circle_diagram(circuit, points, title));
   return kExitOk;
 }
 

@@ -13,7 +13,7 @@
 namespace drivebench::command {
 namespace {
 
-using can::Message;
+using CanMessage = can::Message;
 
 constexpr std::uint64_t kStateEveryTicks = 80;  // as a bench does by default
 
@@ -24,20 +24,20 @@ void CandumpText::add(std::uint32_t axis, const Sample& sample, double time_s) {
   open_tick_ = sample.tick;
   open_time_s_ = time_s;
   Before& before = before_[axis];
-  if (sample.faults != before.faults) put(Message::kFault, axis, sample, time_s);
-  if (sample.index_tick != before.index_tick) put(Message::kIndex, axis, sample, time_s);
+  if (sample.faults != before.faults) put(CanMessage::kFault, axis, sample, time_s);
+  if (sample.index_tick != before.index_tick) put(CanMessage::kIndex, axis, sample, time_s);
   before = {.faults = sample.faults,
             .index_tick = sample.index_tick,
             .wide = before.wide || sample.i_c_a != 0.0 || sample.i_f_a != 0.0 || sample.u_c_v != 0.0 ||
                     sample.u_f_v != 0.0 || sample.hall_lines != 0};
   if (sample.tick % kStateEveryTicks == 0) {
-    put(Message::kState, axis, sample, time_s);
-    put(Message::kCounters, axis, sample, time_s);
+    put(CanMessage::kState, axis, sample, time_s);
+    put(CanMessage::kCounters, axis, sample, time_s);
   }
-  put(Message::kEncoder, axis, sample, time_s);
-  put(Message::kCurrents, axis, sample, time_s);
-  put(Message::kSensors, axis, sample, time_s);
-  put(Message::kPhases, axis, sample, time_s);
+  put(CanMessage::kEncoder, axis, sample, time_s);
+  put(CanMessage::kCurrents, axis, sample, time_s);
+  put(CanMessage::kSensors, axis, sample, time_s);
+  put(CanMessage::kPhases, axis, sample, time_s);
 }
 
 void CandumpText::add(const v1::Input& input, double time_s) {
@@ -68,7 +68,7 @@ void CandumpText::finish() {
 void CandumpText::end_tick() {
   if (!open_tick_) return;
   const std::array<double, 2> values = {static_cast<double>(*open_tick_), is_lockstep_ ? 1.0 : 0.0};
-  put(can::encode(*can::find_message(Message::kSync, address_.profile.fd), address_.profile, 0, values),
+  put(can::encode(*can::find_message(CanMessage::kSync, address_.profile.fd), address_.profile, 0, values),
       open_time_s_);
   open_tick_.reset();
 }
@@ -81,7 +81,7 @@ std::uint32_t CandumpText::node(std::uint32_t axis) const {
 }
 
 /// Nothing if the profile does not have this message.
-void CandumpText::put(Message message, std::uint32_t axis, const Sample& sample, double time_s) {
+void CandumpText::put(CanMessage message, std::uint32_t axis, const Sample& sample, double time_s) {
   const can::MessageRow* const row = can::find_message(message, address_.profile.fd, before_[axis].wide);
   if (row != nullptr) put(can::encode_sample(*row, address_.profile, node(axis), sample), time_s);
 }

@@ -19,7 +19,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::chrono::seconds kPatience{60};  ///< for the controller of the cluster
+constexpr std::chrono::seconds kClusterPatience{60};  ///< for the controller of the cluster
 constexpr int kNoSuchProgram = 127;
 
 /// A word for /bin/sh.
@@ -38,13 +38,13 @@ struct SlurmAnswer {
 
 SlurmAnswer answer_of(const std::vector<std::string>& arguments, const std::string& error_file) {
   Process process(arguments, {.error_file = error_file});
-  const Process::Deadline deadline = Process::in(kPatience);
+  const Process::Deadline deadline = Process::in(kClusterPatience);
   SlurmAnswer answer{.code = 0, .lines = {}};
   while (std::optional<std::string> line = process.read_line(deadline))
     answer.lines.push_back(std::move(*line));
   const std::optional<int> code = process.wait(deadline);
   if (!code)
-    throw UsageError(fmt::format("{} has not answered within {} s", arguments[0], kPatience.count()));
+    throw UsageError(fmt::format("{} has not answered within {} s", arguments[0], kClusterPatience.count()));
   answer.code = *code;
   return answer;
 }

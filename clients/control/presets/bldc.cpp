@@ -4,7 +4,7 @@
 #include "clients/control/presets/presets_families.hpp"
 #include "clients/control/synchronous/bldc_controller.hpp"
 
-namespace drivebench::control {
+namespace drivebench::control::bldc_presets {
 namespace {
 
 /// The motor of problem 10.5.
@@ -68,7 +68,7 @@ Preset preset(const PresetText& text, const BldcParameters& p, const TrajectoryP
 
 }  // namespace
 
-std::vector<Preset> bldc_presets() {
+std::vector<Preset> all() {
   using P = BldcParameters;
   return {
       preset({"book/10.6",
@@ -93,4 +93,4 @@ std::vector<Preset> bldc_presets() {
   };
 }
 
-}  // namespace drivebench::control
+}  // namespace drivebench::control::bldc_presets

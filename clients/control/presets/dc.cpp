@@ -12,7 +12,7 @@
 #include "clients/control/presets/dc_preset.hpp"
 #include "clients/control/presets/presets_families.hpp"
 
-namespace drivebench::control {
+namespace drivebench::control::dc_presets {
 namespace {
 
 constexpr double kPi = std::numbers::pi;
@@ -145,7 +145,7 @@ Preset preset(std::string_view name, std::string_view source, std::string_view e
 
 }  // namespace
 
-std::vector<Preset> dc_presets() {
+std::vector<Preset> all() {
   return {
       preset<DcOpenLoop, SineTorqueMove>(
           "book/2.9", "Chiasson 2005, problem 2.9: sine of 1 A, 65 ms, PI with K_P = 20 and alpha = 1000",
@@ -239,4 +239,4 @@ std::vector<Preset> dc_presets() {
   };
 }
 
-}  // namespace drivebench::control
+}  // namespace drivebench::control::dc_presets

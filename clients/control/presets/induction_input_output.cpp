@@ -10,7 +10,7 @@
 
 // Input-output linearisation against field-oriented control where the flux has to change: the move to 8000
 // rpm and exercise 15.
-namespace drivebench::control {
+namespace drivebench::control::induction_input_output_presets {
 namespace {
 
 using Drive = InductionDriveParameters;
@@ -104,7 +104,7 @@ Preset preset(const PresetText& text, const Drive& drive, const Law& law, const 
 
 }  // namespace
 
-std::vector<Preset> induction_input_output_presets() {
+std::vector<Preset> all() {
   return {
       preset({"book/8.2.5",
               "Chiasson 2005, 8.2.5: input-output linearisation, 0 to 8000 rpm in 0.38 s and back in 0.265 "
@@ -154,4 +154,4 @@ std::vector<Preset> induction_input_output_presets() {
   };
 }
 
-}  // namespace drivebench::control
+}  // namespace drivebench::control::induction_input_output_presets

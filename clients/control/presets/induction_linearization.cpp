@@ -10,7 +10,7 @@
 
 // The linearisations of an induction machine that the book gives equations for but no experiment: with
 // voltage command, and with an integrator before either current. Gains and moves are ours.
-namespace drivebench::control {
+namespace drivebench::control::induction_linearization_presets {
 namespace {
 
 constexpr VoltageLinearizationParameters kVoltage =
@@ -78,7 +78,7 @@ Run flat_run(const InductionDriveParameters& drive, const FlatInductionParameter
 
 }  // namespace
 
-std::vector<Preset> induction_linearization_presets() {
+std::vector<Preset> all() {
   return {
       preset<VoltageLinearizationController>({"book/8.2.5-voltage",
                                               "Chiasson 2005, (8.33): input-output linearisation with "
@@ -120,4 +120,4 @@ std::vector<Preset> induction_linearization_presets() {
   };
 }
 
-}  // namespace drivebench::control
+}  // namespace drivebench::control::induction_linearization_presets

@@ -5,7 +5,7 @@
 
 #include "clients/control/presets/presets_families.hpp"
 
-namespace drivebench::control {
+namespace drivebench::control::induction_servo_presets {
 namespace {
 
 using P = ControllerParameters;
@@ -56,7 +56,7 @@ Preset preset(const PresetText& text, const ControllerParameters& p,
 
 }  // namespace
 
-std::vector<Preset> induction_servo_presets() {
+std::vector<Preset> all() {
   constexpr P kClipped = with(kServoController, &P::quadrature_clip, QuadratureClip::kCircular);
   return {
       preset({"book/8.2.2", "Chiasson 2005, 8.2.2: field-oriented 180 degree move; profile A (30, 13, 30 ms)",
@@ -115,4 +115,4 @@ std::vector<Preset> induction_servo_presets() {
   };
 }
 
-}  // namespace drivebench::control
+}  // namespace drivebench::control::induction_servo_presets

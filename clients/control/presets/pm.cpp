@@ -11,7 +11,7 @@
 #include "clients/control/synchronous/pm_voltage_controller.hpp"
 #include "plant/math/length.hpp"
 
-namespace drivebench::control {
+namespace drivebench::control::pm_presets {
 namespace {
 
 /// The stepping motor of 9.1.4 with 50 pole pairs, 2000 counts, amplifiers of ±40 V and ±6 A.
@@ -160,7 +160,7 @@ Preset run_up(const PresetText& text, const PmSpeedParameters& p, const SpeedSte
 
 }  // namespace
 
-std::vector<Preset> pm_presets() {
+std::vector<Preset> all() {
   using P = PmVoltageParameters;
   return {
       stepper(
@@ -210,4 +210,4 @@ std::vector<Preset> pm_presets() {
   };
 }
 
-}  // namespace drivebench::control
+}  // namespace drivebench::control::pm_presets

@@ -4,34 +4,56 @@
 
 #include "clients/control/presets/preset.hpp"
 
-/// The presets, one file for each family.
+/// The presets, one file and one namespace for each family: families name what is alike in them alike.
 namespace drivebench::control {
 
-std::vector<Preset> induction_servo_presets();
-std::vector<Preset> induction_input_output_presets();
-std::vector<Preset> induction_linearization_presets();
-std::vector<Preset> pm_presets();
-std::vector<Preset> salient_pm_presets();
-std::vector<Preset> stepper_presets();
-std::vector<Preset> two_motor_presets();
-std::vector<Preset> bldc_presets();
-std::vector<Preset> wound_rotor_presets();
-std::vector<Preset> dc_presets();
-std::vector<Preset> wound_dc_presets();
+namespace induction_servo_presets {
+std::vector<Preset> all();
+}
+namespace induction_input_output_presets {
+std::vector<Preset> all();
+}
+namespace induction_linearization_presets {
+std::vector<Preset> all();
+}
+namespace pm_presets {
+std::vector<Preset> all();
+}
+namespace salient_pm_presets {
+std::vector<Preset> all();
+}
+namespace stepper_presets {
+std::vector<Preset> all();
+}
+namespace two_motor_presets {
+std::vector<Preset> all();
+}
+namespace bldc_presets {
+std::vector<Preset> all();
+}
+namespace wound_rotor_presets {
+std::vector<Preset> all();
+}
+namespace dc_presets {
+std::vector<Preset> all();
+}
+namespace wound_dc_presets {
+std::vector<Preset> all();
+}
 
 /// In the order of lists.
 inline constexpr auto kPresetFamilies = {
-    induction_servo_presets,
-    induction_input_output_presets,
-    induction_linearization_presets,
-    pm_presets,
-    salient_pm_presets,
-    stepper_presets,
-    two_motor_presets,
-    bldc_presets,
-    wound_rotor_presets,
-    dc_presets,
-    wound_dc_presets,
+    induction_servo_presets::all,
+    induction_input_output_presets::all,
+    induction_linearization_presets::all,
+    pm_presets::all,
+    salient_pm_presets::all,
+    stepper_presets::all,
+    two_motor_presets::all,
+    bldc_presets::all,
+    wound_rotor_presets::all,
+    dc_presets::all,
+    wound_dc_presets::all,
 };
 
 }  // namespace drivebench::control

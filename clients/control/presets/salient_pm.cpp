@@ -7,7 +7,7 @@
 #include "clients/control/salient/salient_pm_controller.hpp"
 #include "plant/math/length.hpp"
 
-namespace drivebench::control {
+namespace drivebench::control::salient_pm_presets {
 namespace {
 
 // The book has an exercise and no numbers: machine, gains and move are ours.
@@ -69,7 +69,7 @@ Preset preset(const PresetText& text, const SalientPmParameters& p, const Trajec
 
 }  // namespace
 
-std::vector<Preset> salient_pm_presets() {
+std::vector<Preset> all() {
   return {
       preset({"book/9.11",
               "Chiasson 2005, problem 9.11: salient PM machine, linearised torque, the least current "
@@ -85,4 +85,4 @@ std::vector<Preset> salient_pm_presets() {
   };
 }
 
-}  // namespace drivebench::control
+}  // namespace drivebench::control::salient_pm_presets

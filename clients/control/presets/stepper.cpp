@@ -6,7 +6,7 @@
 #include "clients/control/presets/presets_families.hpp"
 #include "clients/control/synchronous/stepper_controller.hpp"
 
-namespace drivebench::control {
+namespace drivebench::control::stepper_presets {
 namespace {
 
 constexpr double kStep_rad = 1.8 / 57.29577951308232;
@@ -43,7 +43,7 @@ Preset preset(std::string_view name, std::string_view source, std::string_view e
 
 }  // namespace
 
-std::vector<Preset> stepper_presets() {
+std::vector<Preset> all() {
   using P = StepperParameters;
   return {
       preset("book/9.4-full", "Chiasson 2005, 9.4: full steps from voltages", "1.8 degrees a step, exactly",
@@ -62,4 +62,4 @@ std::vector<Preset> stepper_presets() {
   };
 }
 
-}  // namespace drivebench::control
+}  // namespace drivebench::control::stepper_presets

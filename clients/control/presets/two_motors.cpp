@@ -6,7 +6,7 @@
 #include "clients/control/presets/presets_families.hpp"
 #include "clients/control/synchronous/two_motor_controller.hpp"
 
-namespace drivebench::control {
+namespace drivebench::control::two_motor_presets {
 namespace {
 
 // The book has the exercise and no numbers: the stepper of section 9.1.4 twice, the second with a flywheel.
@@ -48,7 +48,7 @@ Run run(const TwoMotorParameters& p, const SpeedRampParameters& move, const RunT
 
 }  // namespace
 
-std::vector<Preset> two_motor_presets() {
+std::vector<Preset> all() {
   return {
       preset_of({"exercise/9.9",
                  "Chiasson 2005, problem 9.9: two PM motors on one amplifier; machines, gains and move ours",
@@ -62,4 +62,4 @@ std::vector<Preset> two_motor_presets() {
                 run, kTwoMotors, kMove, kTiming)};
 }
 
-}  // namespace drivebench::control
+}  // namespace drivebench::control::two_motor_presets

@@ -7,7 +7,7 @@
 #include "clients/control/presets/presets_families.hpp"
 #include "clients/control/wound_dc/shunt_dc_control.hpp"
 
-namespace drivebench::control {
+namespace drivebench::control::wound_dc_presets {
 namespace {
 
 // The book has no numbers for these machines: machines, gains and moves are ours.
@@ -112,7 +112,7 @@ Preset preset(const PresetText& text, std::string_view machine_kind, const P& p,
 
 }  // namespace
 
-std::vector<Preset> wound_dc_presets() {
+std::vector<Preset> all() {
   return {
       preset<SeparateDcController>(
           {"book/2.40",
@@ -155,4 +155,4 @@ std::vector<Preset> wound_dc_presets() {
   };
 }
 
-}  // namespace drivebench::control
+}  // namespace drivebench::control::wound_dc_presets

@@ -8,7 +8,7 @@
 #include "clients/control/synchronous/wound_rotor_controller.hpp"
 #include "plant/math/length.hpp"
 
-namespace drivebench::control {
+namespace drivebench::control::wound_rotor_presets {
 namespace {
 
 constexpr WoundRotorModel kMotor = {.pole_pairs = 2.0,
@@ -79,7 +79,7 @@ Preset preset(std::string_view name, std::string_view source, std::string_view e
 
 }  // namespace
 
-std::vector<Preset> wound_rotor_presets() {
+std::vector<Preset> all() {
   return {
       preset("wound-rotor/servo",
              "equations: Chiasson 2005, (6.38) and problem 6.14; machine, move and gains are ours",
@@ -94,4 +94,4 @@ std::vector<Preset> wound_rotor_presets() {
   };
 }
 
-}  // namespace drivebench::control
+}  // namespace drivebench::control::wound_rotor_presets

@@ -17,7 +17,7 @@ namespace fs = std::filesystem;
 namespace {
 
 /// Far more than a result has with its plots and what the device under test printed.
-constexpr std::size_t kMostBytes = std::size_t{256} << 20U;
+constexpr std::size_t kMostResultBytes = std::size_t{256} << 20U;
 
 }  // namespace
 
@@ -30,7 +30,7 @@ fs::path ResultsFolder::file_of(const std::string& name) const {
 }
 
 std::optional<CaseResult> ResultsFolder::find(const std::string& name, const std::string& fingerprint) const {
-  const FileText content = read_file(file_of(name), kMostBytes);
+  const FileText content = read_file(file_of(name), kMostResultBytes);
   if (!content.why_not.empty()) return std::nullopt;
   try {
     const Json file = parse_ordered_json(content.text);

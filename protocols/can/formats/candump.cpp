@@ -9,7 +9,7 @@ namespace {
 
 /// As in linux/can.h.
 constexpr std::uint32_t kErrorFlag = 0x20000000;
-enum FdFlag : std::uint32_t { kBitRateSwitch = 1, kErrorState = 2 };
+enum FdFlag : std::uint32_t { kFdBitRateSwitch = 1, kFdErrorState = 2 };
 
 }  // namespace
 
@@ -31,8 +31,8 @@ void append_candump(std::string& out, double time_s, std::string_view interface,
   } else {
     if (frame.fd) {
       out += '#';
-      append_hex(out, (frame.bit_rate_switch ? kBitRateSwitch : 0u) | (frame.error_state ? kErrorState : 0u),
-                 1);
+      append_hex(
+          out, (frame.bit_rate_switch ? kFdBitRateSwitch : 0u) | (frame.error_state ? kFdErrorState : 0u), 1);
     }
     append_data(out, frame);
   }

@@ -36,7 +36,7 @@ std::vector<Measured> with_speed_and_current(std::vector<Measured> measured, con
   return measured;
 }
 
-std::vector<Measured> move_of(const Outcome& seen) {
+std::vector<Measured> servo_move_of(const Outcome& seen) {
   return with_speed_and_current(errors_of(seen), seen);
 }
 
@@ -140,16 +140,16 @@ ResultSection field_oriented_results() {
                poles_of(control::flux_poles(p.machine, p.flux))),
         "agrees"},
        {"4", "180° in 73 ms at 8 kHz, `book/8.2.2`",
-        "error below two counts, speed below 75 rad/s; simulated 5.46 A", move_of(book),
+        "error below two counts, speed below 75 rad/s; simulated 5.46 A", servo_move_of(book),
         "agrees; the book does not give its profile"},
        {"5", "the same with a sample of delay", "nothing; simulated 1.62 counts, 5.75 A",
-        move_of(closed_loop("book/8.2.2", {.command_delay_ticks = 1})), "the last digits are chaotic"},
+        servo_move_of(closed_loop("book/8.2.2", {.command_delay_ticks = 1})), "the last digits are chaotic"},
        {"5", "the same at 4 kHz, `book/8.2.2-4khz`", "nothing; simulated 1.58 counts, 5.67 A",
-        move_of(closed_loop("book/8.2.2-4khz")), "the last digits are chaotic"},
+        servo_move_of(closed_loop("book/8.2.2-4khz")), "the last digits are chaotic"},
        {"5", "the same with a load of 0.1 N m from the start on", "nothing; simulated 2.22 counts, 6.57 A",
-        move_of(closed_loop("book/8.2.2", {}, {}, {{.load_nm = 0.1, .after_s = 0.0}})), "agrees"},
+        servo_move_of(closed_loop("book/8.2.2", {}, {}, {{.load_nm = 0.1, .after_s = 0.0}})), "agrees"},
        {"5", "the same with a rotor resistance 1.5 times the model's", "nothing; simulated 2.56 counts",
-        move_of(closed_loop("book/8.2.2", {.parameters = {{"machine.rotor_resistance_ohm", 5.85}}})),
+        servo_move_of(closed_loop("book/8.2.2", {.parameters = {{"machine.rotor_resistance_ohm", 5.85}}})),
         "agrees"},
        {"6",
         "error of the speed: by backward difference, by the observer",
@@ -198,7 +198,7 @@ ResultSection high_speed_results() {
         "0 as in "
         "exercise 15, since the listed friction forbids the move"},
        {"8", "the same with flux gains that 4 kHz can sample, `book/8.2.5-soft-flux`",
-        "34 counts with its own gains; simulated 3.7", move_of(soft),
+        "34 counts with its own gains; simulated 3.7", servo_move_of(soft),
         "sound gains in place of the printed ones"},
        {"10",
         "the same references under field-oriented control with constant flux, `book/8.2.5-constant-flux`",
@@ -207,7 +207,7 @@ ResultSection high_speed_results() {
          {"samples at the voltage limit", share_saturated(constant), "%", 15.0}},
         "agrees: it fails"},
        {"10", "the same with field weakening from 313 rad/s on, `book/8.2.5-field-weakening`",
-        "nothing; simulated 1148 counts", move_of(weakened),
+        "nothing; simulated 1148 counts", servo_move_of(weakened),
         "it follows, but braking takes more than the 6 A of the amplifier; the law behind the simulated "
         "number is not known"},
        {"11",
@@ -225,16 +225,17 @@ ResultSection high_speed_results() {
          number("down", fastest_s(1.4e-4, TorqueSign::kGenerating), "s")},
         "agrees with f = 0"},
        {"15a", "half a turn at 75 rad/s with 60 V: `exercise/8.15a-field-oriented`",
-        "an exercise; simulated 1.73 counts", move_of(closed_loop("exercise/8.15a-field-oriented")),
+        "an exercise; simulated 1.73 counts", servo_move_of(closed_loop("exercise/8.15a-field-oriented")),
         "agrees"},
        {"15a", "the same by input-output linearisation, `exercise/8.15a`",
-        "an exercise; simulated 7.8 counts", move_of(closed_loop("exercise/8.15a")), "agrees"},
+        "an exercise; simulated 7.8 counts", servo_move_of(closed_loop("exercise/8.15a")), "agrees"},
        {"15b", "838 rad/s in 1.5 s, soft flux gains, `exercise/8.15b`",
-        "an exercise; simulated 0.81 counts, 3.98 A", move_of(closed_loop("exercise/8.15b")), "agrees"},
+        "an exercise; simulated 0.81 counts, 3.98 A", servo_move_of(closed_loop("exercise/8.15b")), "agrees"},
        {"(8.33)", "voltage command without a current loop on the move of 8.2.2, `book/8.2.5-voltage`",
-        "an equation; no numbers", move_of(closed_loop("book/8.2.5-voltage")), "nothing to compare with"},
+        "an equation; no numbers", servo_move_of(closed_loop("book/8.2.5-voltage")),
+        "nothing to compare with"},
        {"28", "dynamic linearisation, integrator on the d axis, `exercise/8.28`", "an exercise; no numbers",
-        move_of(closed_loop("exercise/8.28")), "nothing to compare with"},
+        servo_move_of(closed_loop("exercise/8.28")), "nothing to compare with"},
        {"29", "dynamic linearisation, integrator on the q axis, with a hanging load, `exercise/8.29`",
         "an exercise; no numbers", loaded_move_of(closed_loop("exercise/8.29")), "nothing to compare with"}}};
 }

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "plant/parameters/parameters.hpp"
+#include "tests/repetitions.hpp"
 #include "tests/server/bench/servo_bench.hpp"
 
 namespace drivebench {
@@ -92,14 +93,15 @@ TEST(BenchState, DET_05_ARestoredBenchContinuesBitForBitForAMillionTicks) {
   EXPECT_EQ(copy.state_hash(), original.state_hash());
   EXPECT_EQ(copy.save(), saved);
   EXPECT_TRUE(same_samples(copy, original));
-  for (int i = 0; i < 1'000'000; ++i) {
+  constexpr int kTicks = repetitions(1'000'000);
+  for (int i = 0; i < kTicks; ++i) {
     drive(original);
     drive(copy);
     if (i < 10'000 || i % 1000 == 0) {
       ASSERT_TRUE(same_samples(copy, original)) << "tick " << copy.tick();
     }
   }
-  EXPECT_EQ(copy.tick(), 1'002'600);
+  EXPECT_EQ(copy.tick(), kTicks + 2600);
   EXPECT_EQ(copy.state_hash(), original.state_hash());
   EXPECT_EQ(copy.sample(0).faults & kDiverged, 0u);
 }
@@ -224,12 +226,14 @@ TEST(BenchState, AForgedStateIsRefusedOrRuns) {
   run_to(original, 300);
   const std::vector<std::byte> saved = original.save();
   ASSERT_TRUE(Bench(rich_setup()).restore(forged(saved, 0, 0x3474'6174'7362'7264u)));
+  constexpr std::size_t kEvery = kSanitized ? 10 : 1;  // of the words
   int taken = 0;
   for (const std::uint64_t value :
        {std::bit_cast<std::uint64_t>(std::nan("")), std::bit_cast<std::uint64_t>(1e300), std::uint64_t{255},
         std::uint64_t{1} << 62}) {
     const std::size_t schedule_end = Bench::kMaxScheduled * sizeof(PackedInput) / 8;
-    for (std::size_t word = 0; word + 1 < saved.size() / 8; word += word + 13 < schedule_end ? 13 : 1) {
+    for (std::size_t word = 0; word + 1 < saved.size() / 8;
+         word += kEvery * (word + 13 < schedule_end ? 13 : 1)) {
       const std::vector<std::byte> bytes = forged(saved, word, value);
       Bench bench(rich_setup());
       const std::uint64_t before = bench.state_hash();
@@ -247,7 +251,7 @@ TEST(BenchState, AForgedStateIsRefusedOrRuns) {
         ASSERT_EQ(bench.sample(axis).faults & kDiverged, 0u) << word;
     }
   }
-  EXPECT_GT(taken, 100);  // counters of samples, for example, can be anything
+  EXPECT_GT(taken, repetitions(100));  // counters of samples, for example, can be anything
 }
 
 // Catches: an axis that another session holds given to the owner that the state names, a lease that ends with

@@ -5,13 +5,14 @@
 #include <cstdint>
 #include <string_view>
 
+#include "tests/repetitions.hpp"
 #include "tests/server/bench/servo_bench.hpp"
 
 namespace drivebench::brutal_plant_test {
 namespace {
 
 constexpr Owner kOwner = 7;
-constexpr int kTicks = 200'000;  // a million steps
+constexpr int kTicks = repetitions(200'000);  // a million steps
 
 /// A motor at full speed, turned by a field that it follows.
 Bench running_bench() {

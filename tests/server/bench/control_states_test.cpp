@@ -5,6 +5,7 @@
 #include <optional>
 #include <random>
 
+#include "tests/repetitions.hpp"
 #include "tests/server/bench/servo_bench.hpp"
 
 namespace drivebench::control_states_test {
@@ -67,7 +68,7 @@ TEST(ControlStates, STATE_01_AgreeWithTheReferenceInEveryPatternOfLosses) {
   const BenchSetup servo = servo_setup();
   std::size_t timeouts = 0;
   std::size_t readied = 0;
-  for (int pattern = 0; pattern < 100'000; ++pattern) {
+  for (int pattern = 0; pattern < repetitions(100'000); ++pattern) {
     BenchSetup setup = servo;
     setup.substeps = 1;
     setup.command_delay_ticks = pattern % 2;
@@ -105,8 +106,8 @@ TEST(ControlStates, STATE_01_AgreeWithTheReferenceInEveryPatternOfLosses) {
       ASSERT_EQ(bench.sample(0).faults, reference.latched ? kCommandTimeout : 0u);
     }
   }
-  EXPECT_GT(timeouts, 10'000u) << "patterns that reach the timeout";
-  EXPECT_GT(readied, 100'000u);
+  EXPECT_GT(timeouts, repetitions(10'000u)) << "patterns that reach the timeout";
+  EXPECT_GT(readied, repetitions(100'000u));
 }
 
 }  // namespace

@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <string>
 
+#include "tests/repetitions.hpp"
 #include "tests/server/config/config_test_bench.hpp"
 
 namespace drivebench::test::files_test {
@@ -158,17 +159,18 @@ TEST(ConfigFiles, CFG_08_OneDamagedByteEitherLoadsOrGivesAConfigError) {
     text[at] = static_cast<char>(static_cast<unsigned char>(text[at]) ^ (1u << bit));
     return text;
   };
+  constexpr unsigned kEvery = kSanitized ? 8 : 1;
   for (std::size_t i = 0; i < bench.size(); ++i) {
-    for (unsigned bit = 0; bit < 8; ++bit)
+    for (unsigned bit = i % kEvery; bit < 8; bit += kEvery)
       try_it(damage(bench, i, bit));
-    try_it(std::string(bench).erase(i, 1));
+    if (i % kEvery == 0) try_it(std::string(bench).erase(i, 1));
   }
   for (std::size_t i = 0; i < motor.size(); ++i) {
     folder.write("motors/servo-im.toml", damage(motor, i, i % 8));
     try_it(bench);
   }
-  EXPECT_GT(loaded, 1000);  // comments
-  EXPECT_GT(refused, 1000);
+  EXPECT_GT(loaded, repetitions(1000));  // comments
+  EXPECT_GT(refused, repetitions(1000));
 }
 
 // Catches: a foreign recording whose configuration makes the replay open files of this machine.

@@ -13,6 +13,7 @@
 #include "server/engine/stepped_engine.hpp"
 #include "server/host/asio.hpp"
 #include "server/pacing/pacer.hpp"
+#include "tests/repetitions.hpp"
 #include "tests/server/engine/engine_requests.hpp"
 #include "tests/server/recording/run_config.hpp"
 
@@ -97,7 +98,7 @@ TEST(ThreadedEngine, DET_01_AHundredRunsBesideOtherWorkAreOneRun) {
     });
   }
   std::size_t different = 0;
-  for (int run = 0; run < 100; ++run) {
+  for (int run = 0; run < repetitions(100); ++run) {
     asio::io_context io(1);
     const auto engine = make_threaded_engine(config, nullptr, io, kTicks);
     engine->on_end = [&] { io.stop(); };

@@ -8,6 +8,7 @@
 #include "protocols/sample_codec.hpp"
 #include "server/recording/recorder.hpp"
 #include "server/recording/recording_writer.hpp"
+#include "tests/repetitions.hpp"
 #include "tests/server/recording/disks.hpp"
 #include "tests/server/recording/run_config.hpp"
 
@@ -141,7 +142,7 @@ TEST(RecordingDisk, REC_02_SyncedDataSurviveAPowerCut) {
   ASSERT_EQ(safe.back(), kTicks);
   std::mt19937 random(2);
   std::set<std::uint64_t> seen;
-  for (int n = 0; n < 600; ++n) {
+  for (int n = 0; n < repetitions(600); ++n) {
     const std::size_t cut = 1 + random() % log.entries.size();
     const Bytes image = image_after_cut(log.entries, cut, random);
     const Found found(std::vector<Bytes>{image});

@@ -20,7 +20,7 @@ except ImportError:
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[2] / "helpers"))
 from experiment_test import ENDED, OWNER, SIGNALS, ExperimentTest, request
 from wire_client import PATIENCE_S, SERVER, Client, Closed, pb
-from wire_test import SERVO_TEXT
+from wire_test import SERVO_TEXT, repetitions
 
 
 class Experiments(ExperimentTest):
@@ -155,7 +155,7 @@ class Experiments(ExperimentTest):
         client = self.client(server)
         reference = {}
         halfway = 0
-        for n in range(100):
+        for n in range(repetitions(100)):
             ticks = rng.randrange(2000, 30_000)
             decimation = rng.choice((1, 1, 3, 10))
             wanted = request(ticks, amplitude=20.0 + n % 4, decimation=decimation, request_key=f"kill {n}")
@@ -190,8 +190,8 @@ class Experiments(ExperimentTest):
                 whole = reference[n % 4] = self.whole(client, request(30_000, amplitude=20.0 + n % 4)).rows(len(SIGNALS))
             self.assertSameRows(rows, tuple(v for row in whole[:ticks + 1:decimation] for v in row))
         listed = client.ask(list_experiments=pb.ListExperiments(owner=OWNER)).experiment_list.experiments
-        self.assertEqual(max(e.id for e in listed), 104)  # none ran twice
-        self.assertGreater(halfway, 50)
+        self.assertEqual(max(e.id for e in listed), repetitions(100) + 4)  # none ran twice
+        self.assertGreater(halfway, repetitions(50))
 
     def receive_until(self, link, count):
         """From now on the link breaks after so many bytes have come."""
@@ -214,11 +214,12 @@ class Experiments(ExperimentTest):
         self.assertEqual(len(signals), 12)
         slow = self.client(server, receive_buffer=4096)
         before = server.memory_kib()
-        number = self.run_it(slow, request(200_000, signals=signals)).id
+        ticks = repetitions(200_000)
+        number = self.run_it(slow, request(ticks, signals=signals)).id
         slow.send(fetch_experiment=pb.FetchExperiment(id=number, owner=OWNER))  # and does not read
         fast = self.client(server)
         fetched = self.fetch(fast, number)
-        self.assertEqual(len(fetched.data), 200_001 * 12 * 8)
+        self.assertEqual(len(fetched.data), (ticks + 1) * 12 * 8)
         self.assertEqual(len(self.whole(fast, request(100)).rows(3)), 101)
         # The queue of the recorder (2 s of samples and commands: 9,024 entries of 648 bytes) touches 5,800 KiB at most, its
         # chunks take 2,100 KiB. The data have 18,750 KiB.

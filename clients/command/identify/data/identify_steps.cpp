@@ -23,7 +23,7 @@ using identification::Settings;
 
 namespace {
 
-double seconds(std::string_view text, const std::string& whole) {
+double seconds_in(std::string_view text, const std::string& whole) {
   const auto value = finite_number(text);
   if (!value || *value < 0.0)
     throw UsageError(
@@ -34,8 +34,9 @@ double seconds(std::string_view text, const std::string& whole) {
 void set_window(const std::string& text, identification::Processing& p) {
   const std::size_t colon = text.find(':');
   const std::string_view view = text;
-  p.from_s = seconds(view.substr(0, colon), text);
-  if (colon != std::string::npos && colon + 1 < text.size()) p.to_s = seconds(view.substr(colon + 1), text);
+  p.from_s = seconds_in(view.substr(0, colon), text);
+  if (colon != std::string::npos && colon + 1 < text.size())
+    p.to_s = seconds_in(view.substr(colon + 1), text);
   if (p.to_s > 0.0 && p.to_s <= p.from_s)
     throw UsageError(fmt::format("--window '{}' ends before it begins", printable(text)));
 }

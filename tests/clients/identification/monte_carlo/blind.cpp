@@ -14,7 +14,7 @@
 namespace drivebench::identification {
 namespace {
 
-constexpr double kTurn = 2.0 * std::numbers::pi;
+constexpr double kWireTurn = 2.0 * std::numbers::pi;
 
 bool has_magnet(const MotorDraw& draw) {
   return draw.kind == MotorKind::kPmSynchronous || draw.kind == MotorKind::kBldc;
@@ -36,9 +36,9 @@ void score_wiring(BlindMotor& m, const Settings& truth, const Settings& found, c
   for (const Estimate& error : result.sensors)
     zero += error.name == "angle offset" ? error.value : 0.0;
   // The angle of the settings is (reversed ? -1 : 1) times the column's, plus zero_rad.
-  const double wanted = (m.wires.reversed ? 1.0 : -1.0) * m.wires.zero_counts * kTurn /
+  const double wanted = (m.wires.reversed ? 1.0 : -1.0) * m.wires.zero_counts * kWireTurn /
                         truth.counts_per_revolution * truth.pole_pairs;
-  m.zero = !has_magnet(*m.draw) || std::abs(std::remainder(zero - wanted, kTurn)) < kTurn / 120.0;
+  m.zero = !has_magnet(*m.draw) || std::abs(std::remainder(zero - wanted, kWireTurn)) < kWireTurn / 120.0;
 }
 
 double median(std::vector<double> values) {

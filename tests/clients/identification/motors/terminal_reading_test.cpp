@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "clients/identification/motors/classical_tests.hpp"
+#include "tests/repetitions.hpp"
 
 namespace drivebench::identification::terminal_reading_test {
 namespace {
@@ -105,6 +106,7 @@ TEST(TerminalReading, MovesTheVoltagesByTheirShift) {
 // always but for 1 %. Catches: noise
 // divided by the samples twice, a 68 % interval, steps that repeat taken for white noise.
 TEST(TerminalReading, IntervalsHoldAsOftenAsTheySay) {
+  if (kSanitized) GTEST_SKIP() << kStatistic;
   struct Case {
     double noise_a, step_a, least, most;
   };

@@ -6,6 +6,8 @@
 #include <random>
 #include <vector>
 
+#include "tests/repetitions.hpp"
+
 namespace drivebench::identification::gauss_newton_test {
 namespace {
 
@@ -62,6 +64,7 @@ double coverage(double memory) {
 // information alone would hold in a third. Catches: a covariance without the scatter of the scores, a factor
 // in either.
 TEST(GaussNewton, IntervalsHoldForWhiteAndForColouredResiduals) {
+  if (kSanitized) GTEST_SKIP() << kStatistic;
   EXPECT_GT(coverage(0.0), 0.9);
   EXPECT_LT(coverage(0.0), 0.995);
   EXPECT_GT(coverage(0.95), 0.87);
@@ -70,6 +73,7 @@ TEST(GaussNewton, IntervalsHoldForWhiteAndForColouredResiduals) {
 // The scores of white residuals scatter by chance. Catches: intervals that this widens, by 7 % on the average
 // here.
 TEST(GaussNewton, ChanceWidensNoIntervals) {
+  if (kSanitized) GTEST_SKIP() << kStatistic;
   double growth = 0.0;
   for (std::uint64_t seed = 1; seed <= 200; ++seed) {
     const Fit fit = fitted(noisy(0.0, seed));

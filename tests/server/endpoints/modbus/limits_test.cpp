@@ -1,6 +1,7 @@
 // Limits on the number of connections, on their rate and on their silence, and the log of each.
 #include <sstream>
 
+#include "tests/repetitions.hpp"
 #include "tests/server/endpoints/modbus/modbus_bench.hpp"
 
 namespace drivebench::modbus::limits_test {
@@ -114,7 +115,7 @@ TEST(Modbus, LIMIT_06_JustBelowTheRateEverythingIsAnswered) {
     }
     return count;
   };
-  constexpr std::uint32_t kHour = 3600 * kRate;
+  constexpr std::uint32_t kHour = repetitions(3600u) * kRate;
   EXPECT_EQ(served(kRate - 1, kHour), kHour);
   EXPECT_EQ(served(kRate, kHour), kHour);
   // Request n comes after (n - 1)/2100 s: 2000 + (n - 1) 2000/2100 >= n up to n = 41980; one less by

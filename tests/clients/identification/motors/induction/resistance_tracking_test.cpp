@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "tests/clients/identification/bench_data.hpp"
+#include "tests/repetitions.hpp"
 
 namespace drivebench::identification::resistance_tracking_test {
 namespace {
@@ -158,6 +159,7 @@ bool is_stated(const ResistanceEstimate& e, const char* name) {
 // 17 % of T_R if their scatter alone made the interval. Catches: the pull of noise in the columns; steps that
 // err alike in every window.
 TEST(Resistances, AreStatedOnlyWhereTheNoiseLetsThem) {
+  if (kSanitized) GTEST_SKIP() << kStatistic;
   std::mt19937_64 engine(20261124);
   const auto drawn = [&engine](double low, double high) {
     return low + (high - low) * static_cast<double>(engine() >> 11U) * 0x1p-53;
