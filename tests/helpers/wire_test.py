@@ -11,6 +11,7 @@ import unittest
 from wire_client import BENCHES, PATIENCE_S, REPOSITORY, Server, pb
 
 SERVO_TEXT = (BENCHES / "servo.toml").read_text(encoding="utf-8").replace("../motors/", f"{REPOSITORY}/configs/motors/")
+SANITIZED = "DRIVEBENCH_SANITIZED" in os.environ  # as the CMake files set it
 # A busy machine is no silent controller.
 PATIENT_TEXT = SERVO_TEXT.replace("watchdog_ticks = 20", "watchdog_ticks = 400000").replace("lease_s = 2.0", "lease_s = 60.0")
 ESC_TEXT = (BENCHES / "esc.toml").read_text(encoding="utf-8").replace("../motors/", f"{REPOSITORY}/configs/motors/")
@@ -46,7 +47,7 @@ counts_per_revolution = 4096
 
 def repetitions(of_an_ordinary_build):
     """So many in an ordinary build, a tenth of them under a sanitizer, which finds a mistake in memory in these, too."""
-    return of_an_ordinary_build // 10 if "DRIVEBENCH_SANITIZED" in os.environ else of_an_ordinary_build
+    return of_an_ordinary_build // 10 if SANITIZED else of_an_ordinary_build
 
 
 def until(condition, what):

@@ -78,9 +78,11 @@ TEST(BridgeState, NoBytesBreakABridge) {
   Bridge bridge;
   std::size_t taken = 0;
   std::size_t refused = 0;
-  for (std::size_t at = kDigestAt + 8; at + 8 <= state.size(); at += kSanitized ? 56 : 8) {
-    for (const std::uint64_t word : kNasty) {
+  for (std::size_t at = kDigestAt + 8; at + 8 <= state.size(); at += 8) {
+    for (std::size_t n = 0; n < kNasty.size(); ++n) {
+      const std::uint64_t word = kNasty[n];
       if (word == word_at(state, at)) continue;
+      if (kSanitized && (at / 8 + n) % 7 != 0) continue;  // one or two for each word
       std::vector<std::byte> forged = state;
       std::memcpy(forged.data() + at, &word, sizeof word);
       sign(forged);
