@@ -253,10 +253,9 @@ void Axis::end_tick(const MotionState& before, Tick tick) noexcept {
     drivebench::advance(core_.p.thermal, state_.thermal, state_.heat_j, core_.timing.period_s);
     state_.heat_j = 0.0;
     adjust();
-  } else {
-    look_inside();
   }
   if (core_.tap != nullptr) return;  // no sample is read at gate level
+  if (!core_.p.thermal.enabled) look_inside();
   core_.sensors.end_tick(state_.sensors,
                          {.current_a = sensed_currents(),
                           .voltage_v = state_.voltage_v,

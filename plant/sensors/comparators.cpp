@@ -26,20 +26,23 @@ constexpr double mean(const ThreePhase& x) noexcept {
   return (x.a + x.b + x.c) / 3.0;
 }
 
-/// The instant between two at which f is zero, found to 1e-14 of its size at their ends.
+/// A zero is found to this part of the values at both ends.
+constexpr double kCloseEnough = 1e-14;
+
+/// The instant between two at which f is zero.
 template <class F>
-double zero_between(const F& f, double from_s, double from_value, double to_s, double to_value) noexcept {
+double zero_between(const F& f, double from, double from_value, double to, double to_value) noexcept {
   constexpr int kMaxGuesses = 60;
-  Bracket bracket{.low = from_s, .low_value = from_value, .high = to_s, .high_value = to_value};
-  const double close_enough = 1e-14 * (std::abs(from_value) + std::abs(to_value));
-  double at_s = from_s;
+  Bracket bracket{.low = from, .low_value = from_value, .high = to, .high_value = to_value};
+  const double close_enough = kCloseEnough * (std::abs(from_value) + std::abs(to_value));
+  double at = from;
   for (int guess = 0; guess < kMaxGuesses; ++guess) {
-    at_s = bracket.guess();
-    const double value = f(at_s);
+    at = bracket.guess();
+    const double value = f(at);
     if (std::abs(value) <= close_enough) break;
-    bracket.narrow(at_s, value);
+    bracket.narrow(at, value);
   }
-  return at_s;
+  return at;
 }
 
 /// Terminal less reference at three instants of an interval.
@@ -54,95 +57,134 @@ struct Difference {
 
 }  // namespace
 
-/// What a comparator sees t after the start of an interval. With u = u0 + u1 t + u2 t² before the RC,
-///   RC y' = u - y     y = (u0 - u1 RC + 2 u2 RC²) + (u1 - 2 u2 RC) t + u2 t² + C e^(-t/RC)
+/// What a comparator sees at t, the part of an interval that has passed: 0 to 1. With u = u0 + u1 t + u2 t²
+/// before the RC, which is T in this unit,
+///   T y' = u - y     y = (u0 - u1 T + 2 u2 T²) + (u1 - 2 u2 T) t + u2 t² + C e^(-t/T)
 class Comparators::Input {
  public:
-  Input(const Difference& u, double duration_s) noexcept
+  explicit Input(const Difference& u) noexcept
       : constant_v_(u.start_v),
-        slope_((4.0 * u.middle_v - 3.0 * u.start_v - u.end_v) / duration_s),
-        curve_(2.0 * (u.start_v - 2.0 * u.middle_v + u.end_v) / (duration_s * duration_s)) {}
+        slope_(4.0 * u.middle_v - 3.0 * u.start_v - u.end_v),
+        curve_(2.0 * (u.start_v - 2.0 * u.middle_v + u.end_v)) {}
 
-  void filter(double rc_s, double filtered_v) noexcept {
-    constant_v_ += rc_s * (2.0 * curve_ * rc_s - slope_);
-    slope_ -= 2.0 * curve_ * rc_s;
+  /// `rate` is 1/T.
+  void filter(double time_constant, double rate, double filtered_v) noexcept {
+    constant_v_ += time_constant * (2.0 * curve_ * time_constant - slope_);
+    slope_ -= 2.0 * curve_ * time_constant;
     transient_v_ = filtered_v - constant_v_;
-    rate_per_s_ = 1.0 / rc_s;
+    time_constant_ = time_constant;
+    rate_ = rate;
   }
 
   double at(double t) const noexcept { return along(t) + (filters() ? transient_v_ * decay(t) : 0.0); }
   /// The same where e^(-t/RC) is known.
   double at(double t, double decay) const noexcept { return along(t) + transient_v_ * decay; }
 
-  /// The instants between which it rises or falls all the time: `from_s`, those where it turns, `to_s`.
+  /// The instants between which it rises or falls all the time: `from`, those where it turns, `to`.
   struct Runs {
-    std::array<double, 4> instant_s;
+    std::array<double, 4> instant;
     std::size_t count = 0;
-    void add(double t) noexcept { instant_s[count++] = t; }
+    void add(double t) noexcept { instant[count++] = t; }
   };
-  Runs runs(double from_s, double to_s) const noexcept {
+  Runs runs(double from, double to) const noexcept {
     Runs result;
-    result.add(from_s);
-    if (keeps_direction(from_s, to_s)) {
-      result.add(to_s);
+    result.add(from);
+    if (keeps_direction(from, to)) {
+      result.add(to);
       return result;
     }
-    const double bend_s = bend();
-    if (bend_s > from_s && bend_s < to_s) {
-      add_turn(from_s, bend_s, result);
-      add_turn(bend_s, to_s, result);
+    const double bends_at = bend();
+    if (bends_at > from && bends_at < to) {
+      add_turn(from, bends_at, result);
+      add_turn(bends_at, to, result);
     } else {
-      add_turn(from_s, to_s, result);
+      add_turn(from, to, result);
     }
-    result.add(to_s);
+    result.add(to);
     return result;
   }
 
+  /// The instant within one of these at which it passes a voltage; from_v and to_v are what it is beyond that
+  /// at the ends.
+  double passes(double level_v, double from, double from_v, double to, double to_v) const noexcept {
+    double at;
+    if (settles_at(level_v, from, to, kCloseEnough * (std::abs(from_v) + std::abs(to_v)), at)) return at;
+    return zero_between([&](double t) noexcept { return this->at(t) - level_v; }, from, from_v, to, to_v);
+  }
+
  private:
-  bool filters() const noexcept { return rate_per_s_ > 0.0; }
+  bool filters() const noexcept { return rate_ > 0.0; }
   /// Whether parabola and transient go the same way, so that it turns nowhere: no exponential is needed.
-  bool keeps_direction(double from_s, double to_s) const noexcept {
-    const double from = slope_ + 2.0 * curve_ * from_s;
-    const double to = slope_ + 2.0 * curve_ * to_s;
+  bool keeps_direction(double from, double to) const noexcept {
+    const double first = slope_ + 2.0 * curve_ * from;
+    const double last = slope_ + 2.0 * curve_ * to;
     const double settling = filters() ? -transient_v_ : 0.0;
-    return (from >= 0.0 && to >= 0.0 && settling >= 0.0) || (from <= 0.0 && to <= 0.0 && settling <= 0.0);
+    return (first >= 0.0 && last >= 0.0 && settling >= 0.0) ||
+           (first <= 0.0 && last <= 0.0 && settling <= 0.0);
   }
   double along(double t) const noexcept { return constant_v_ + t * (slope_ + t * curve_); }
   /// Asked for an instant several times, the last two are kept.
   double decay(double t) const noexcept {
     if (t == 0.0) return 1.0;
-    if (t == newest_.at_s) return newest_.decay;
-    if (t == older_.at_s) return older_.decay;
+    if (t == newest_.at) return newest_.decay;
+    if (t == older_.at) return older_.decay;
     older_ = newest_;
-    newest_ = {.at_s = t, .decay = exponential(-rate_per_s_ * t)};
+    newest_ = {.at = t, .decay = exponential(-rate_ * t)};
     return newest_.decay;
   }
   double slope(double t) const noexcept {
-    return slope_ + 2.0 * curve_ * t - (filters() ? rate_per_s_ * transient_v_ * decay(t) : 0.0);
+    return slope_ + 2.0 * curve_ * t - (filters() ? rate_ * transient_v_ * decay(t) : 0.0);
   }
   /// Where the slope itself turns; before the interval if it does not.
   double bend() const noexcept {
-    const double bending = rate_per_s_ * rate_per_s_ * transient_v_;
+    const double bending = rate_ * rate_ * transient_v_;
     if (bending == 0.0) return -1.0;
     const double ratio = -2.0 * curve_ / bending;
-    return ratio > 0.0 && std::isfinite(ratio) ? -logarithm(ratio) / rate_per_s_ : -1.0;
+    return ratio > 0.0 && std::isfinite(ratio) ? -logarithm(ratio) * time_constant_ : -1.0;
   }
   /// Between two instants the slope rises or falls all the time: it is zero at most once.
-  void add_turn(double from_s, double to_s, Runs& runs) const noexcept {
-    const double from = slope(from_s);
-    const double to = slope(to_s);
-    if (!(from * to < 0.0)) return;
+  void add_turn(double from, double to, Runs& runs) const noexcept {
+    const double first = slope(from);
+    const double last = slope(to);
+    if (!(first * last < 0.0)) return;
     const auto slope_at = [this](double t) noexcept { return slope(t); };
-    runs.add(zero_between(slope_at, from_s, from, to_s, to));
+    runs.add(zero_between(slope_at, from, first, to, last));
+  }
+  /// passes() by Newton's method, from where the parabola as it is at `from` would be passed: a logarithm and
+  /// no exponential. False if the parabola goes too far for that.
+  bool settles_at(double level_v, double from, double to, double close_enough_v, double& at) const noexcept {
+    constexpr int kMaxGuesses = 4;
+    constexpr double kShort = 1.0 / 64.0;  // step_decay() errs by 1e-16 there
+    if (!filters()) return false;
+    double decay = (level_v - along(from)) / transient_v_;
+    if (!(decay > 0.0 && decay <= 1.0)) return false;
+    at = -logarithm(decay) * time_constant_;
+    for (int guess = 0; guess < kMaxGuesses; ++guess) {
+      if (!(at > from && at < to)) return false;
+      const double rest_v = transient_v_ * decay;
+      const double v = along(at) + rest_v - level_v;
+      if (std::abs(v) <= close_enough_v) return true;
+      const double step = v / (rate_ * rest_v - slope_ - 2.0 * curve_ * at);
+      if (!(std::abs(rate_ * step) <= kShort)) return false;
+      at += step;
+      decay *= step_decay(rate_ * step);
+    }
+    return false;
+  }
+  /// e^-x by its first terms.
+  static double step_decay(double x) noexcept {
+    return 1.0 - x * (1.0 - x * (1.0 / 2.0 -
+                                 x * (1.0 / 6.0 - x * (1.0 / 24.0 - x * (1.0 / 120.0 - x * (1.0 / 720.0))))));
   }
 
   double constant_v_;
   double slope_;
   double curve_;
   double transient_v_ = 0.0;
-  double rate_per_s_ = 0.0;
+  double time_constant_ = 0.0;
+  double rate_ = 0.0;
   struct Decay {
-    double at_s = 0.0;
+    double at = 0.0;
     double decay = 1.0;
   };
   mutable Decay newest_{};
@@ -154,6 +196,7 @@ Comparators::Comparators(const ComparatorParameters& p, double period_s, std::ui
     : p_(p),
       period_s_(period_s),
       noise_steps_(std::max<std::int64_t>(1, floor_to_integer(period_s / kNoiseStepS + 0.5))),
+      noise_step_s_(period_s / static_cast<double>(noise_steps_)),
       noise_{NoiseChannel(seed, noise_channel), NoiseChannel(seed, noise_channel + 1),
              NoiseChannel(seed, noise_channel + 2)} {}
 
@@ -181,22 +224,24 @@ void Comparators::follow(ComparatorMemory& m, Tick tick, double start_s, double 
   const ThreePhase reference{
       .a = reference_v(path.start_v), .b = reference_v(path.middle_v), .c = reference_v(path.end_v)};
   const bool filters = p_.rc_s > 0.0;
-  const double decay = filters ? exponential(-duration_s / p_.rc_s) : 0.0;
+  const double rate = filters ? duration_s / p_.rc_s : 0.0;
+  const double time_constant = filters ? p_.rc_s / duration_s : 0.0;
+  const double decay = exponential(-rate);
   std::array<double, 3> filtered_v{m.filtered_v.a, m.filtered_v.b, m.filtered_v.c};
   for (int k = 0; k < 3; ++k) {
     const Difference u{.start_v = of(path.start_v, k) - reference.a,
                        .middle_v = of(path.middle_v, k) - reference.b,
                        .end_v = of(path.end_v, k) - reference.c};
-    Input input(u, duration_s);
+    Input input(u);
     double& y = filtered_v[index_of(k)];
     const double before_v = filters ? y : u.start_v;
-    if (filters) input.filter(p_.rc_s, y);
+    if (filters) input.filter(time_constant, rate, y);
     const auto [lowest_v, highest_v] = std::minmax({u.start_v, u.control_v(), u.end_v});
     const Span given{.lowest_v = lowest_v, .highest_v = highest_v};
     if (!is_out_of_reach(away_v(m, k, given.with(before_v)))) {
-      switch_within(m, {k, tick, start_s, log}, input, given, duration_s);
+      switch_within(m, {k, tick, start_s, duration_s, log}, input, given);
     }
-    y = filters ? input.at(duration_s, decay) : u.end_v;
+    y = filters ? input.at(1.0, decay) : u.end_v;
   }
   m.filtered_v = {.a = filtered_v[0], .b = filtered_v[1], .c = filtered_v[2]};
 }
@@ -213,20 +258,25 @@ bool Comparators::is_out_of_reach(double away_v) const noexcept {
 }
 
 /// The noise changes at fixed instants of the tick, whatever the intervals are. Where it cannot bring the
-/// input to its threshold, only how large it is at most is asked; once none can, the rest is skipped.
+/// input to its threshold, only how large it is at most is asked; once none can, the rest is skipped: a long
+/// interval is asked again when the transient has had a step.
 void Comparators::switch_within(ComparatorMemory& m, const Place& place, const Input& input,
-                                const Span& given, double duration_s) const noexcept {
+                                const Span& given) const noexcept {
   const double added_v = offset_v(place.terminal);
-  if (p_.noise_rms_v == 0.0) return switch_within(m, place, input, added_v, 0.0, duration_s);
+  if (p_.noise_rms_v == 0.0) return switch_within(m, place, input, added_v, 0.0, 1.0);
   const NoiseChannel noise = noise_[index_of(place.terminal)];
-  const double step_s = period_s_ / static_cast<double>(noise_steps_);
-  std::int64_t step = floor_to_integer(place.start_s / step_s + 1e-9);
+  constexpr double kManySteps = 4.0;
+  const double steps = place.duration_s / noise_step_s_;
+  const double part = 1.0 / steps;
+  const double begun = place.start_s / noise_step_s_;
+  std::int64_t step = floor_to_integer(begun + 1e-9);
+  const std::int64_t again = steps > kManySteps ? step + 2 : -1;
   double largest = -1.0;  // draw of noise that reaches the threshold from where the input has come to
-  for (double from_s = 0.0; from_s < duration_s; ++step) {
-    const double to_s = std::min(duration_s, static_cast<double>(step + 1) * step_s - place.start_s);
-    if (to_s <= from_s) continue;
-    if (largest < 0.0) {
-      const double missing_v = away_v(m, place.terminal, given.with(input.at(from_s)));
+  for (double from = 0.0; from < 1.0; ++step) {
+    const double to = std::min(1.0, (static_cast<double>(step + 1) - begun) * part);
+    if (to <= from) continue;
+    if (largest < 0.0 || step == again) {
+      const double missing_v = away_v(m, place.terminal, given.with(input.at(from)));
       if (is_out_of_reach(missing_v)) return;
       const double sigmas = missing_v / p_.noise_rms_v;
       largest = sigmas > 0.0 ? (1.0 + 1e-9) * exponential(-0.5 * sigmas * sigmas) : 1.0;
@@ -234,15 +284,15 @@ void Comparators::switch_within(ComparatorMemory& m, const Place& place, const I
     const auto number = static_cast<std::uint64_t>(place.tick * noise_steps_ + step);
     if (noise.draw(number) <= largest) {
       const double noise_v = p_.noise_rms_v * noise.gaussian(number);
-      switch_within(m, place, input, added_v + noise_v, from_s, to_s);
+      switch_within(m, place, input, added_v + noise_v, from, to);
       largest = -1.0;
     }
-    from_s = to_s;
+    from = to;
   }
 }
 
 void Comparators::switch_within(ComparatorMemory& m, const Place& place, const Input& input, double added_v,
-                                double from_s, double to_s) const noexcept {
+                                double from, double to) const noexcept {
   const std::uint64_t bit = std::uint64_t{1} << place.terminal;
   const double half_v = 0.5 * p_.hysteresis_v;
   const auto beyond_v = [&]() noexcept { return (m.levels & bit) != 0 ? -half_v : half_v; };
@@ -251,23 +301,23 @@ void Comparators::switch_within(ComparatorMemory& m, const Place& place, const I
     m.levels ^= bit;
     ++m.edges[index_of(place.terminal)];
     m.edge_tick[index_of(place.terminal)] = place.tick;
-    m.edge_s[index_of(place.terminal)] = place.start_s + t;
+    const double at_s = place.start_s + t * place.duration_s;
+    m.edge_s[index_of(place.terminal)] = at_s;
     if (place.log == nullptr) return;
-    place.log->add({.at_s = place.start_s + t,
+    place.log->add({.at_s = at_s,
                     .kind = EventKind::kComparator,
                     .channel = static_cast<std::uint32_t>(place.terminal),
                     .level = (m.levels & bit) != 0 ? 1U : 0U});
   };
-  double v = input.at(from_s) + added_v;
-  if (is_beyond(v)) switch_at(from_s);  // a jump of the voltage or of the noise
-  const Input::Runs runs = input.runs(from_s, to_s);
+  double v = input.at(from) + added_v;
+  if (is_beyond(v)) switch_at(from);  // a jump of the voltage or of the noise
+  const Input::Runs runs = input.runs(from, to);
   for (std::size_t n = 1; n < runs.count; ++n) {
-    const double run_s = runs.instant_s[n];
-    const double end_v = input.at(run_s) + added_v;
+    const double end_v = input.at(runs.instant[n]) + added_v;
     if (is_beyond(end_v)) {
       const double threshold_v = beyond_v();
-      const auto above_v = [&](double t) noexcept { return input.at(t) + added_v - threshold_v; };
-      switch_at(zero_between(above_v, runs.instant_s[n - 1], v - threshold_v, run_s, end_v - threshold_v));
+      switch_at(input.passes(threshold_v - added_v, runs.instant[n - 1], v - threshold_v, runs.instant[n],
+                             end_v - threshold_v));
     }
     v = end_v;
   }

@@ -75,6 +75,7 @@ class Comparators {
     int terminal;
     Tick tick;
     double start_s;
+    double duration_s;
     EventLog* log;
   };
 
@@ -94,14 +95,16 @@ class Comparators {
   /// Whether the voltage that is missing to the threshold is more than any noise.
   bool is_out_of_reach(double away_v) const noexcept;
   /// `given` is what the input before the RC is between.
-  void switch_within(ComparatorMemory& m, const Place& place, const Input& input, const Span& given,
-                     double duration_s) const noexcept;
-  void switch_within(ComparatorMemory& m, const Place& place, const Input& input, double added_v,
-                     double from_s, double to_s) const noexcept;
+  void switch_within(ComparatorMemory& m, const Place& place, const Input& input,
+                     const Span& given) const noexcept;
+  /// From one part of the interval to another.
+  void switch_within(ComparatorMemory& m, const Place& place, const Input& input, double added_v, double from,
+                     double to) const noexcept;
 
   ComparatorParameters p_;
   double period_s_;
   std::int64_t noise_steps_;  ///< in a tick
+  double noise_step_s_;
   std::array<NoiseChannel, 3> noise_;
 };
 

@@ -189,10 +189,13 @@ template <class Machine, class Shaft>
 RotorMotion DriveTrain<Machine, Shaft>::middle_motion(const Passed& passed) const noexcept {
   const RotorMotion& from = passed.from_motion;
   const RotorMotion& to = passed.to_motion;
-  return turned({.angle_rad = 0.5 * (from.angle_rad + to.angle_rad) +
-                              0.125 * passed.duration_s * (from.speed_rad_s - to.speed_rad_s),
-                 .speed_rad_s = 0.5 * (from.speed_rad_s + to.speed_rad_s),
-                 .electrical = from.electrical});
+  RotorMotion middle{.angle_rad = 0.5 * (from.angle_rad + to.angle_rad) +
+                                  0.125 * passed.duration_s * (from.speed_rad_s - to.speed_rad_s),
+                     .speed_rad_s = 0.5 * (from.speed_rad_s + to.speed_rad_s),
+                     .electrical = from.electrical};
+  if constexpr (Machine::kUsesAngle)
+    middle.electrical = rotated(from.electrical, pole_pairs_ * (middle.angle_rad - from.angle_rad));
+  return middle;
 }
 
 /// Of the terminals that do not float; mean_v is by Simpson's rule.
