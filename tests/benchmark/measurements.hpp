@@ -4,59 +4,101 @@
 
 #include "tests/benchmark/harness/report.hpp"
 
-/// The measurements, one file each, as long as plan() says. They throw when something does not work at all.
+/// The measurements, one file and one namespace each, as long as plan() says. They throw when something does not work at all.
 namespace drivebench::speed {
 
 /// A whole tick against the bare integration of the same substeps.
-std::vector<Row> measure_tick();
+namespace tick {
+std::vector<Row> measure();
+}
 /// A step of each kind of machine against a straight line, their ticks with all sensors, the switched
 /// inverter and a dynamometer.
-std::vector<Row> measure_machines();
+namespace machines {
+std::vector<Row> measure();
+}
 /// Free mode with recording, on one CPU, against real time.
-std::vector<Row> measure_free_mode();
+namespace free_mode {
+std::vector<Row> measure();
+}
 /// A lockstep exchange against a blocking ping-pong of the same sizes.
-std::vector<Row> measure_exchange();
+namespace exchange {
+std::vector<Row> measure();
+}
 /// A lockstep exchange through shared memory against two processes that wake each other by a futex.
-std::vector<Row> measure_shared_memory();
+namespace shared_memory {
+std::vector<Row> measure();
+}
 /// A step of the bench in process behind the C ABI against the same step without it.
-std::vector<Row> measure_sdk();
+namespace sdk {
+std::vector<Row> measure();
+}
 /// The gate level behind the C ABI: a run in which nothing is due, one to the next edge, and the time that a
 /// simulated second of a speed controller takes.
-std::vector<Row> measure_bridge();
+namespace bridge {
+std::vector<Row> measure();
+}
 /// The pacers against a bare clock_nanosleep loop; the server in real time.
-std::vector<Row> measure_realtime();
+namespace realtime {
+std::vector<Row> measure();
+}
 /// Ten axes at 20 kHz into the recorder.
-std::vector<Row> measure_recorder();
+namespace recorder {
+std::vector<Row> measure();
+}
 /// Resident memory of the server with a controller and 32 viewers.
-std::vector<Row> measure_memory();
+namespace memory {
+std::vector<Row> measure();
+}
 
 /// Controllers alone, and with their benches in one process.
-std::vector<Row> measure_control();
+namespace controllers {
+std::vector<Row> measure();
+}
 
 /// The data of an experiment on their way to a client against a copy of as many bytes.
-std::vector<Row> measure_experiment();
+namespace experiment {
+std::vector<Row> measure();
+}
 
 /// The identification of an induction motor, and of 800 random motors with their experiments.
-std::vector<Row> measure_identification();
+namespace identifications {
+std::vector<Row> measure();
+}
 
 /// `drivebench test`: its speed over presets, on one core and on two, what checks and a single case cost.
-std::vector<Row> measure_suite();
+namespace suite {
+std::vector<Row> measure();
+}
 /// `drivebench test --merge` of 100,000 results: time, memory and the size of the page.
-std::vector<Row> measure_merge();
+namespace merge {
+std::vector<Row> measure();
+}
 
 /// Encoding and decoding of one CAN frame.
-std::vector<Row> measure_can_codec();
+namespace can_codec {
+std::vector<Row> measure();
+}
+namespace can_exchange {
 /// A lockstep exchange over udp_multicast against a ping-pong of the same datagrams.
 std::vector<Row> measure_multicast();
 /// The same over the kernel's CAN; without it, a row that says how to get it.
 std::vector<Row> measure_socketcan();
+}  // namespace can_exchange
 /// A lockstep exchange by Modbus function 23 against plain libmodbus.
-std::vector<Row> measure_modbus();
+namespace modbus_exchange {
+std::vector<Row> measure();
+}
 /// A healthy client beside 1,000 idle clients, 32 viewers, and 50 clients that never read.
-std::vector<Row> measure_crowd();
+namespace crowd {
+std::vector<Row> measure();
+}
 /// The ticks of a bench beside hostile clients, against the same clients at another server.
-std::vector<Row> measure_attacks();
+namespace attacks {
+std::vector<Row> measure();
+}
 /// A polite Modbus client beside abusers, and beside plain libmodbus.
-std::vector<Row> measure_abuse();
+namespace abuse {
+std::vector<Row> measure();
+}
 
 }  // namespace drivebench::speed

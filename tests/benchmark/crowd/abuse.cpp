@@ -20,7 +20,7 @@
 #include "tests/benchmark/harness/statistics.hpp"
 #include "tests/benchmark/measurements.hpp"
 
-namespace drivebench::speed {
+namespace drivebench::speed::abuse {
 namespace {
 
 using namespace std::chrono_literals;
@@ -123,7 +123,7 @@ RealtimeRun beside_bench(Abuse abuse, const std::filesystem::path& bench) {
 
 }  // namespace
 
-std::vector<Row> measure_abuse() {
+std::vector<Row> measure() {
   const ScratchFolder folder;
   BenchConfig config = load_config(command::find_config("servo-modbus"));
   config.modbus.port = 0;
@@ -169,4 +169,4 @@ std::vector<Row> measure_abuse() {
   return rows;
 }
 
-}  // namespace drivebench::speed
+}  // namespace drivebench::speed::abuse

@@ -1,8 +1,6 @@
 #include "tests/benchmark/crowd/attackers.hpp"
 
-#include <sys/resource.h>
 #include <sys/socket.h>
-#include <unistd.h>
 
 #include <array>
 #include <cerrno>
@@ -23,7 +21,6 @@ namespace {
 
 using namespace std::chrono_literals;
 
-constexpr int kLowestPriority = 19;
 constexpr std::size_t kSessions = 64;
 constexpr std::size_t kAtTheDoor = 100;
 
@@ -100,7 +97,7 @@ Attackers::Round round_of(const std::string& address, std::size_t count, const s
 
 Attackers::Attackers(Round round) {
   thread_ = std::thread([this, round = std::move(round)] {
-    check(::setpriority(PRIO_PROCESS, static_cast<id_t>(::gettid()), kLowestPriority) == 0, "setpriority");
+    give_way();
     while (!stop_.load()) {
       try {
         round();

@@ -13,7 +13,7 @@
 #include "tests/benchmark/harness/statistics.hpp"
 #include "tests/benchmark/measurements.hpp"
 
-namespace drivebench::speed {
+namespace drivebench::speed::attacks {
 namespace {
 
 constexpr double kMaxResidentMiB = 128.0;
@@ -52,7 +52,7 @@ constexpr std::array kAttacks = std::to_array<Attack>({
 
 }  // namespace
 
-std::vector<Row> measure_attacks() {
+std::vector<Row> measure() {
   const ScratchFolder folder;
   BenchConfig config = bench_config("servo-realtime");
   const std::string bench = guarded_bench(folder, "bench", config).string();
@@ -95,4 +95,4 @@ std::vector<Row> measure_attacks() {
   return rows;
 }
 
-}  // namespace drivebench::speed
+}  // namespace drivebench::speed::attacks

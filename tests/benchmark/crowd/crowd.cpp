@@ -20,7 +20,7 @@
 #include "tests/benchmark/harness/statistics.hpp"
 #include "tests/benchmark/measurements.hpp"
 
-namespace drivebench::speed {
+namespace drivebench::speed::crowd {
 namespace {
 
 using namespace std::chrono_literals;
@@ -102,7 +102,7 @@ Cut cut_deaf(link::Link& client, const std::string& address, pid_t server) {
 
 }  // namespace
 
-std::vector<Row> measure_crowd() {
+std::vector<Row> measure() {
   allow_descriptors(4096);
   const ScratchFolder folder;
   BenchConfig config = bench_config("servo-realtime");
@@ -159,4 +159,4 @@ std::vector<Row> measure_crowd() {
   return rows;
 }
 
-}  // namespace drivebench::speed
+}  // namespace drivebench::speed::crowd

@@ -13,7 +13,7 @@
 #include "tests/benchmark/harness/server.hpp"
 #include "tests/benchmark/measurements.hpp"
 
-namespace drivebench::speed {
+namespace drivebench::speed::memory {
 namespace {
 
 using namespace std::chrono_literals;
@@ -91,7 +91,7 @@ double peak_until(std::chrono::steady_clock::time_point end, pid_t server, const
 
 }  // namespace
 
-std::vector<Row> measure_memory() {
+std::vector<Row> measure() {
   const ScratchFolder folder;
   const std::string path = folder / "bench.socket";
   Server server({command::find_config("servo-realtime").string(), "--unix", path});
@@ -126,4 +126,4 @@ std::vector<Row> measure_memory() {
            .note = fmt::format("from 5 s to {:.0f} s", elapsed_s)}};
 }
 
-}  // namespace drivebench::speed
+}  // namespace drivebench::speed::memory

@@ -16,7 +16,7 @@
 #include "tests/benchmark/harness/statistics.hpp"
 #include "tests/benchmark/measurements.hpp"
 
-namespace drivebench::speed {
+namespace drivebench::speed::realtime {
 namespace {
 
 constexpr double kMaxP99Ratio = 1.3;
@@ -139,7 +139,7 @@ Row late_ticks_of_server() {
 
 }  // namespace
 
-std::vector<Row> measure_realtime() {
+std::vector<Row> measure() {
   std::vector<std::string> notes;
   const Rounds<Round> rounds = alternate(notes);
   std::vector<Row> rows{row("lateness p99, sleep", rounds, &Round::sleep),
@@ -149,4 +149,4 @@ std::vector<Row> measure_realtime() {
   return rows;
 }
 
-}  // namespace drivebench::speed
+}  // namespace drivebench::speed::realtime

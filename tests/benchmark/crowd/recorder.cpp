@@ -13,7 +13,7 @@
 #include "tests/benchmark/harness/server.hpp"
 #include "tests/benchmark/measurements.hpp"
 
-namespace drivebench::speed {
+namespace drivebench::speed::recorder {
 namespace {
 
 constexpr std::size_t kAxes = 10;
@@ -69,7 +69,7 @@ std::uint64_t messages_in(const std::filesystem::path& recording) {
 
 }  // namespace
 
-std::vector<Row> measure_recorder() {
+std::vector<Row> measure() {
   const BenchConfig config = ten_axes();
   const ScratchFolder folder;
   const std::filesystem::path file = folder / "ten-axes.mcap";
@@ -98,4 +98,4 @@ std::vector<Row> measure_recorder() {
        .note = fmt::format("{} entries in {:.2f} s, {:.0f} MB/s", wanted, elapsed_s, megabytes / elapsed_s)}};
 }
 
-}  // namespace drivebench::speed
+}  // namespace drivebench::speed::recorder

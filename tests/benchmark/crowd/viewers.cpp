@@ -1,9 +1,7 @@
 #include "tests/benchmark/crowd/viewers.hpp"
 
 #include <fmt/core.h>
-#include <sys/resource.h>
 #include <sys/socket.h>
-#include <unistd.h>
 
 #include <cerrno>
 #include <fstream>
@@ -15,12 +13,6 @@
 namespace drivebench::speed {
 
 using namespace std::chrono_literals;
-
-namespace {
-
-constexpr int kLowestPriority = 19;
-
-}  // namespace
 
 Viewers::Viewers(const std::string& address, int count) {
   for (int i = 0; i < count; ++i)
@@ -47,7 +39,7 @@ Viewers::~Viewers() {
 
 void Viewers::read() {
   // They stand for other computers: no measured thread may wait for them.
-  check(::setpriority(PRIO_PROCESS, static_cast<id_t>(::gettid()), kLowestPriority) == 0, "setpriority");
+  give_way();
   while (!stop_.load()) {
     for (const auto& viewer : links_) {
       while (const auto samples = viewer->next_samples(0ms)) {

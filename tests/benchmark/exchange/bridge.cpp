@@ -14,7 +14,7 @@
 #include "tests/benchmark/measurements.hpp"
 #include "tests/clients/sdk/leg_setting.hpp"
 
-namespace drivebench::speed {
+namespace drivebench::speed::bridge {
 namespace {
 
 constexpr double kMostIdleNs = 30.0;
@@ -107,7 +107,7 @@ class Controller {
 
 }  // namespace
 
-std::vector<Row> measure_bridge() {
+std::vector<Row> measure() {
   const std::array cpu{cpu_pair().far};
   const Pinned pinned(cpu[0]);
   Controller controller;
@@ -145,4 +145,4 @@ std::vector<Row> measure_bridge() {
                                static_cast<double>(edges) / simulated_s)}};
 }
 
-}  // namespace drivebench::speed
+}  // namespace drivebench::speed::bridge

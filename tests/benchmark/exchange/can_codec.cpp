@@ -11,7 +11,7 @@
 #include "tests/benchmark/harness/statistics.hpp"
 #include "tests/benchmark/measurements.hpp"
 
-namespace drivebench::speed {
+namespace drivebench::speed::can_codec {
 namespace {
 
 constexpr double kMaxFrame_ns = 50.0;
@@ -72,7 +72,7 @@ Round one_round(const can::MessageRow& row) {
 
 }  // namespace
 
-std::vector<Row> measure_can_codec() {
+std::vector<Row> measure() {
   const std::array cpu{cpu_pair().far};
   const Pinned pinned(cpu[0]);
   Row encode{.name = "CAN frame, encoded", .unit = "ns", .limit = Limit{Limit::Kind::kAtMost, kMaxFrame_ns}};
@@ -94,4 +94,4 @@ std::vector<Row> measure_can_codec() {
   return {encode, decode};
 }
 
-}  // namespace drivebench::speed
+}  // namespace drivebench::speed::can_codec

@@ -16,7 +16,7 @@
 #include "tests/benchmark/harness/statistics.hpp"
 #include "tests/benchmark/measurements.hpp"
 
-namespace drivebench::speed {
+namespace drivebench::speed::can_exchange {
 namespace {
 
 using can::Message;
@@ -312,4 +312,4 @@ std::vector<Row> measure_socketcan() {
   });
 }
 
-}  // namespace drivebench::speed
+}  // namespace drivebench::speed::can_exchange

@@ -19,7 +19,7 @@
 #include "tests/benchmark/harness/statistics.hpp"
 #include "tests/benchmark/measurements.hpp"
 
-namespace drivebench::speed {
+namespace drivebench::speed::exchange {
 namespace {
 
 constexpr double kMaxP50Ratio = 1.25;
@@ -139,7 +139,7 @@ Row row(const std::string& name, const Rounds<Round>& rounds, Percentiles Round:
 
 }  // namespace
 
-std::vector<Row> measure_exchange() {
+std::vector<Row> measure() {
   const CpuPair cpu = cpu_pair();
   const ScratchFolder folder;
   const std::string bench = command::find_config("servo").string();
@@ -173,4 +173,4 @@ std::vector<Row> measure_exchange() {
           row("exchange unix p50, one CPU", same, kUnix, kP50, {})};
 }
 
-}  // namespace drivebench::speed
+}  // namespace drivebench::speed::exchange

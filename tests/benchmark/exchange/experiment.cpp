@@ -17,7 +17,7 @@
 #include "tests/benchmark/harness/statistics.hpp"
 #include "tests/benchmark/measurements.hpp"
 
-namespace drivebench::speed {
+namespace drivebench::speed::experiment {
 namespace {
 
 constexpr double kMaxRatio = 2.0;
@@ -128,7 +128,7 @@ std::string bench_file(const ScratchFolder& folder) {
 
 }  // namespace
 
-std::vector<Row> measure_experiment() {
+std::vector<Row> measure() {
   const CpuPair cpu = cpu_pair();
   const ScratchFolder folder;
   auto pinned = std::make_unique<Pinned>(cpu.far);
@@ -158,4 +158,4 @@ std::vector<Row> measure_experiment() {
            .note = "the same while it runs as fast as it goes, recorded"}};
 }
 
-}  // namespace drivebench::speed
+}  // namespace drivebench::speed::experiment

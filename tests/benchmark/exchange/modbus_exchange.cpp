@@ -13,7 +13,7 @@
 #include "tests/benchmark/harness/statistics.hpp"
 #include "tests/benchmark/measurements.hpp"
 
-namespace drivebench::speed {
+namespace drivebench::speed::modbus_exchange {
 namespace {
 
 constexpr double kMaxP50Ratio = 1.3;
@@ -92,7 +92,7 @@ Row row(const char* name, const Rounds<Round>& rounds, double Percentiles::*figu
 
 }  // namespace
 
-std::vector<Row> measure_modbus() {
+std::vector<Row> measure() {
   const CpuPair cpu = cpu_pair();
   const ScratchFolder folder;
   auto pinned = std::make_unique<Pinned>(cpu.far);  // the servers inherit it
@@ -120,4 +120,4 @@ std::vector<Row> measure_modbus() {
   return rows;
 }
 
-}  // namespace drivebench::speed
+}  // namespace drivebench::speed::modbus_exchange

@@ -14,7 +14,7 @@
 #include "tests/benchmark/harness/statistics.hpp"
 #include "tests/benchmark/measurements.hpp"
 
-namespace drivebench::speed {
+namespace drivebench::speed::sdk {
 namespace {
 
 constexpr double kMaxOverheadNs = 100.0;
@@ -92,7 +92,7 @@ Round one_round(Pair& pair) {
 
 }  // namespace
 
-std::vector<Row> measure_sdk() {
+std::vector<Row> measure() {
   const std::array cpu{cpu_pair().far};
   const Pinned pinned(cpu[0]);
   Pair pair;
@@ -110,4 +110,4 @@ std::vector<Row> measure_sdk() {
                                static_cast<double>(bench_config("servo").setup.period_ns) / abi_ns)}};
 }
 
-}  // namespace drivebench::speed
+}  // namespace drivebench::speed::sdk

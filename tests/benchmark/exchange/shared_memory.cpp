@@ -20,7 +20,7 @@
 #include "tests/benchmark/harness/statistics.hpp"
 #include "tests/benchmark/measurements.hpp"
 
-namespace drivebench::speed {
+namespace drivebench::speed::shared_memory {
 namespace {
 
 constexpr double kMaxSpinningUs = 1.5;
@@ -114,7 +114,7 @@ Row row(const std::string& name, const Rounds<Round>& rounds, Percentiles Round:
 
 }  // namespace
 
-std::vector<Row> measure_shared_memory() {
+std::vector<Row> measure() {
   const CpuPair cpu = cpu_pair();
   const ScratchFolder folder;
   const std::string bench = command::find_config("servo").string();
@@ -153,4 +153,4 @@ std::vector<Row> measure_shared_memory() {
           row("exchange shm, sleeping, p99", rounds, &Round::sleeping, kP99, Limit{kRatio, kMaxP99Ratio})};
 }
 
-}  // namespace drivebench::speed
+}  // namespace drivebench::speed::shared_memory

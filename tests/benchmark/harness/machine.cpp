@@ -2,7 +2,9 @@
 
 #include <fmt/core.h>
 #include <stdlib.h>  // mkdtemp
+#include <sys/resource.h>
 #include <sys/utsname.h>
+#include <unistd.h>
 
 #include <cerrno>
 #include <ctime>
@@ -45,6 +47,11 @@ Pinned::Pinned(int cpu) {
 
 Pinned::~Pinned() {
   sched_setaffinity(0, sizeof(before_), &before_);
+}
+
+void give_way() {
+  constexpr int kLowestPriority = 19;
+  check(::setpriority(PRIO_PROCESS, static_cast<id_t>(::gettid()), kLowestPriority) == 0, "setpriority");
 }
 
 std::string machine_description() {

@@ -35,6 +35,9 @@ class Pinned {
   cpu_set_t before_{};
 };
 
+/// The calling thread runs where nobody else wants to.
+void give_way();
+
 /// Model and number of the CPUs, and the kernel: a figure needs them.
 std::string machine_description();
 

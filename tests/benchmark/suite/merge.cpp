@@ -15,7 +15,7 @@
 #include "tests/benchmark/measurements.hpp"
 #include "tests/benchmark/suite/suite_run.hpp"
 
-namespace drivebench::speed {
+namespace drivebench::speed::merge {
 namespace {
 
 constexpr double kMost_s = 20.0;
@@ -65,7 +65,7 @@ std::string version_of_drivebench() {
 
 }  // namespace
 
-std::vector<Row> measure_merge() {
+std::vector<Row> measure() {
   const ScratchFolder folder;
   const std::filesystem::path suite = folder / "merge.toml";
   const std::filesystem::path page = folder / "merge.html";
@@ -99,4 +99,4 @@ std::vector<Row> measure_merge() {
            .limit = Limit{Limit::Kind::kAtMost, kMostPage_mb}}};
 }
 
-}  // namespace drivebench::speed
+}  // namespace drivebench::speed::merge

@@ -13,7 +13,7 @@
 #include "tests/benchmark/measurements.hpp"
 #include "tests/benchmark/suite/suite_run.hpp"
 
-namespace drivebench::speed {
+namespace drivebench::speed::suite {
 namespace {
 
 constexpr std::size_t kRounds = 5;
@@ -91,7 +91,7 @@ struct Round {
 
 }  // namespace
 
-std::vector<Row> measure_suite() {
+std::vector<Row> measure() {
   const CpuPair cpu = cpu_pair();
   const double long_s = planned(20.0, 1.0);  // of the bench, so that the start of a case does not count
   const int long_cases = planned(4, 2);      // an even number, for two cores
@@ -154,4 +154,4 @@ std::vector<Row> measure_suite() {
            .note = "drivebench control and a server, both started anew"}};
 }
 
-}  // namespace drivebench::speed
+}  // namespace drivebench::speed::suite

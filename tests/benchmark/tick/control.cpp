@@ -15,7 +15,7 @@
 #include "tests/benchmark/measurements.hpp"
 #include "tests/book/measurement_of.hpp"
 
-namespace drivebench::speed {
+namespace drivebench::speed::controllers {
 namespace {
 
 constexpr std::size_t kRounds = 10;
@@ -98,7 +98,7 @@ Row closed_loop_of(std::string_view name) {
 
 }  // namespace
 
-std::vector<Row> measure_control() {
+std::vector<Row> measure() {
   std::vector<Row> rows;
   for (const std::string_view name :
        {"book/8.2.2", "book/8.2.5-soft-flux", "book/9.1.4", "book/10.6", "wound-rotor/servo", "book/2.18"}) {
@@ -108,4 +108,4 @@ std::vector<Row> measure_control() {
   return rows;
 }
 
-}  // namespace drivebench::speed
+}  // namespace drivebench::speed::controllers

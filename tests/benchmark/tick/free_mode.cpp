@@ -11,7 +11,7 @@
 #include "tests/benchmark/harness/statistics.hpp"
 #include "tests/benchmark/measurements.hpp"
 
-namespace drivebench::speed {
+namespace drivebench::speed::free_mode {
 namespace {
 
 constexpr double kMinTimesRealTime = 150.0;
@@ -44,7 +44,7 @@ struct Round {
 
 }  // namespace
 
-std::vector<Row> measure_free_mode() {
+std::vector<Row> measure() {
   const int short_run_s = planned(20, 1);
   const int long_run_s = planned(120, 3);
   const std::array cpu{cpu_pair().far};
@@ -66,4 +66,4 @@ std::vector<Row> measure_free_mode() {
                                1e3 * median(rounds.results, &Round::start_s))}};
 }
 
-}  // namespace drivebench::speed
+}  // namespace drivebench::speed::free_mode

@@ -11,7 +11,7 @@
 #include "tests/benchmark/measurements.hpp"
 #include "tests/clients/identification/monte_carlo/monte_carlo.hpp"
 
-namespace drivebench::speed {
+namespace drivebench::speed::identifications {
 namespace {
 
 using namespace identification;
@@ -104,8 +104,8 @@ Row monte_carlo_row() {
 
 }  // namespace
 
-std::vector<Row> measure_identification() {
+std::vector<Row> measure() {
   return {start_row(), refinement_row(), monte_carlo_row()};
 }
 
-}  // namespace drivebench::speed
+}  // namespace drivebench::speed::identifications

@@ -17,7 +17,7 @@
 #include "tests/benchmark/measurements.hpp"
 #include "tests/benchmark/tick/bare_machines.hpp"
 
-namespace drivebench::speed {
+namespace drivebench::speed::machines {
 namespace {
 
 constexpr double kMaxStepRatio = 1.3;
@@ -301,7 +301,7 @@ Row dynamometer() {
 
 }  // namespace
 
-std::vector<Row> measure_machines() {
+std::vector<Row> measure() {
   std::vector<Row> rows = steps();
   rows.push_back(switched_period());
   for (Row& row : ticks())
@@ -310,4 +310,4 @@ std::vector<Row> measure_machines() {
   return rows;
 }
 
-}  // namespace drivebench::speed
+}  // namespace drivebench::speed::machines

@@ -16,7 +16,7 @@
 #include "tests/benchmark/measurements.hpp"
 #include "tests/benchmark/tick/bare_machines.hpp"
 
-namespace drivebench::speed {
+namespace drivebench::speed::tick {
 namespace {
 
 constexpr double kMaxRatio = 4.0;
@@ -163,8 +163,8 @@ Row measure(const std::string& name, bool running) {
 
 }  // namespace
 
-std::vector<Row> measure_tick() {
+std::vector<Row> measure() {
   return {measure("tick, standing", false), measure("tick, turning", true)};
 }
 
-}  // namespace drivebench::speed
+}  // namespace drivebench::speed::tick
