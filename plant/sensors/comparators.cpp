@@ -155,7 +155,7 @@ class Comparators::Input {
   bool settles_at(double level_v, double from, double to, double close_enough_v, double& at) const noexcept {
     constexpr int kMaxGuesses = 4;
     constexpr double kShort = 1.0 / 64.0;  // step_decay() errs by 1e-16 there
-    if (!filters()) return false;
+    if (transient_v_ == 0.0) return false;
     double decay = (level_v - along(from)) / transient_v_;
     if (!(decay > 0.0 && decay <= 1.0)) return false;
     at = -logarithm(decay) * time_constant_;
@@ -164,10 +164,10 @@ class Comparators::Input {
       const double rest_v = transient_v_ * decay;
       const double v = along(at) + rest_v - level_v;
       if (std::abs(v) <= close_enough_v) return true;
-      const double step = v / (rate_ * rest_v - slope_ - 2.0 * curve_ * at);
-      if (!(std::abs(rate_ * step) <= kShort)) return false;
-      at += step;
-      decay *= step_decay(rate_ * step);
+      const double falling_v = rate_ * rest_v - slope_ - 2.0 * curve_ * at;
+      if (!(std::abs(rate_ * v) <= kShort * std::abs(falling_v)) || falling_v == 0.0) return false;
+      at += v / falling_v;
+      decay *= step_decay(rate_ * v / falling_v);
     }
     return false;
   }
