@@ -134,7 +134,7 @@ class Axis {
   AxisCore core_;
   std::unique_ptr<Train> train_;
   AxisState state_;
-  MachineTruth truth_;   ///< follows from the state
+  MachineTruth truth_;   ///< follows from the state; at gate level it is not kept up to date
   Tick open_tick_ = -1;  ///< the last one of open_tick(), since restore()
 };
 

@@ -125,7 +125,7 @@ class GateAxis {
     LegLevels levels{};
     std::uint64_t joined = 0;  ///< bit 0 for a: legs that change within it without moving their voltage
   };
-  /// Of an instant.
+  /// The tick and the step of the grid around an instant.
   struct Place {
     Tick tick = 0;
     Picoseconds tick_start = 0;
@@ -206,7 +206,7 @@ class GateAxis {
   int substeps_;
 
   Clock clock_{};          ///< where the axis is: at the end of a part, not before now_
-  mutable Place place_{};  ///< of the clock, when it was asked for: to divide takes longer than what asks
+  mutable Place place_{};  ///< of the clock when place() was last called, whose divisions take long
   Moment base_{};          ///< where that part, or the first one that next_edge() has looked at, began
   Moment unjoined_{};      ///< before a part with joined legs that does not begin at base_
   Moment here_{};          ///< at now_, if run_to_now() has been there since begin_here(); else at kNowhere

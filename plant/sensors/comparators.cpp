@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 #include "plant/math/bracket.hpp"
 #include "plant/math/exponential.hpp"
@@ -58,7 +59,7 @@ struct Difference {
 }  // namespace
 
 /// What a comparator sees at t, the part of an interval that has passed: 0 to 1. With u = u0 + u1 t + u2 t²
-/// before the RC, which is T in this unit,
+/// before the RC, whose time constant is T in this unit,
 ///   T y' = u - y     y = (u0 - u1 T + 2 u2 T²) + (u1 - 2 u2 T) t + u2 t² + C e^(-t/T)
 class Comparators::Input {
  public:
@@ -67,17 +68,23 @@ class Comparators::Input {
         slope_(4.0 * u.middle_v - 3.0 * u.start_v - u.end_v),
         curve_(2.0 * (u.start_v - 2.0 * u.middle_v + u.end_v)) {}
 
-  /// `rate` is 1/T.
+  /// `rate` is 1/T. In an interval so short that u2 T² is the rounding of u, its mean acts.
   void filter(double time_constant, double rate, double filtered_v) noexcept {
-    constant_v_ += time_constant * (2.0 * curve_ * time_constant - slope_);
-    slope_ -= 2.0 * curve_ * time_constant;
+    constexpr double kShort = 1e-6;
+    if (rate < kShort) {
+      constant_v_ += 0.5 * slope_ + curve_ / 3.0;
+      slope_ = curve_ = 0.0;
+    } else {
+      constant_v_ += time_constant * (2.0 * curve_ * time_constant - slope_);
+      slope_ -= 2.0 * curve_ * time_constant;
+    }
     transient_v_ = filtered_v - constant_v_;
     time_constant_ = time_constant;
     rate_ = rate;
   }
 
   double at(double t) const noexcept { return along(t) + (filters() ? transient_v_ * decay(t) : 0.0); }
-  /// The same where e^(-t/RC) is known.
+  /// The same where e^(-t/T) is known.
   double at(double t, double decay) const noexcept { return along(t) + transient_v_ * decay; }
 
   /// The instants between which it rises or falls all the time: `from`, those where it turns, `to`.
@@ -107,9 +114,9 @@ class Comparators::Input {
   /// The instant within one of these at which it passes a voltage; from_v and to_v are what it is beyond that
   /// at the ends.
   double passes(double level_v, double from, double from_v, double to, double to_v) const noexcept {
-    double at;
-    if (settles_at(level_v, from, to, kCloseEnough * (std::abs(from_v) + std::abs(to_v)), at)) return at;
-    return zero_between([&](double t) noexcept { return this->at(t) - level_v; }, from, from_v, to, to_v);
+    const double close_enough_v = kCloseEnough * (std::abs(from_v) + std::abs(to_v));
+    if (const std::optional<double> at_once = settles_at(level_v, from, to, close_enough_v)) return *at_once;
+    return zero_between([&](double t) noexcept { return at(t) - level_v; }, from, from_v, to, to_v);
   }
 
  private:
@@ -150,26 +157,28 @@ class Comparators::Input {
     const auto slope_at = [this](double t) noexcept { return slope(t); };
     runs.add(zero_between(slope_at, from, first, to, last));
   }
-  /// passes() by Newton's method, from where the parabola as it is at `from` would be passed: a logarithm and
-  /// no exponential. False if the parabola goes too far for that.
-  bool settles_at(double level_v, double from, double to, double close_enough_v, double& at) const noexcept {
+  /// passes() by Newton's method, a logarithm and no exponential, from the instant at which the transient
+  /// would reach the level if the parabola stayed where it is at `from`. Nothing without a transient, and
+  /// where this does not settle at once.
+  std::optional<double> settles_at(double level_v, double from, double to,
+                                   double close_enough_v) const noexcept {
     constexpr int kMaxGuesses = 4;
     constexpr double kShort = 1.0 / 64.0;  // step_decay() errs by 1e-16 there
-    if (transient_v_ == 0.0) return false;
+    if (transient_v_ == 0.0) return std::nullopt;
     double decay = (level_v - along(from)) / transient_v_;
-    if (!(decay > 0.0 && decay <= 1.0)) return false;
-    at = -logarithm(decay) * time_constant_;
+    if (!(decay > 0.0 && decay <= 1.0)) return std::nullopt;
+    double at = -logarithm(decay) * time_constant_;
     for (int guess = 0; guess < kMaxGuesses; ++guess) {
-      if (!(at > from && at < to)) return false;
+      if (!(at > from && at < to)) return std::nullopt;
       const double rest_v = transient_v_ * decay;
       const double v = along(at) + rest_v - level_v;
-      if (std::abs(v) <= close_enough_v) return true;
+      if (std::abs(v) <= close_enough_v) return at;
       const double falling_v = rate_ * rest_v - slope_ - 2.0 * curve_ * at;
-      if (!(std::abs(rate_ * v) <= kShort * std::abs(falling_v)) || falling_v == 0.0) return false;
+      if (!(std::abs(rate_ * v) <= kShort * std::abs(falling_v)) || falling_v == 0.0) return std::nullopt;
       at += v / falling_v;
       decay *= step_decay(rate_ * v / falling_v);
     }
-    return false;
+    return std::nullopt;
   }
   /// e^-x by its first terms.
   static double step_decay(double x) noexcept {
@@ -226,7 +235,7 @@ void Comparators::follow(ComparatorMemory& m, Tick tick, double start_s, double 
   const bool filters = p_.rc_s > 0.0;
   const double rate = filters ? duration_s / p_.rc_s : 0.0;
   const double time_constant = filters ? p_.rc_s / duration_s : 0.0;
-  const double decay = exponential(-rate);
+  const double decay = filters ? exponential(-rate) : 1.0;
   std::array<double, 3> filtered_v{m.filtered_v.a, m.filtered_v.b, m.filtered_v.c};
   for (int k = 0; k < 3; ++k) {
     const Difference u{.start_v = of(path.start_v, k) - reference.a,
@@ -259,21 +268,24 @@ bool Comparators::is_out_of_reach(double away_v) const noexcept {
 
 /// The noise changes at fixed instants of the tick, whatever the intervals are. Where it cannot bring the
 /// input to its threshold, only how large it is at most is asked; once none can, the rest is skipped: a long
-/// interval is asked again when the transient has had a step.
+/// interval is asked again after its first whole step, when the transient has decayed by that much. A step
+/// that would begin with the end of the interval, but for rounding, belongs to the next one.
 void Comparators::switch_within(ComparatorMemory& m, const Place& place, const Input& input,
                                 const Span& given) const noexcept {
   const double added_v = offset_v(place.terminal);
   if (p_.noise_rms_v == 0.0) return switch_within(m, place, input, added_v, 0.0, 1.0);
   const NoiseChannel noise = noise_[index_of(place.terminal)];
+  constexpr double kSameInstant = 1e-9;  // in steps
   constexpr double kManySteps = 4.0;
   const double steps = place.duration_s / noise_step_s_;
   const double part = 1.0 / steps;
   const double begun = place.start_s / noise_step_s_;
-  std::int64_t step = floor_to_integer(begun + 1e-9);
+  std::int64_t step = floor_to_integer(begun + kSameInstant);
   const std::int64_t again = steps > kManySteps ? step + 2 : -1;
   double largest = -1.0;  // draw of noise that reaches the threshold from where the input has come to
   for (double from = 0.0; from < 1.0; ++step) {
-    const double to = std::min(1.0, (static_cast<double>(step + 1) - begun) * part);
+    const double until = static_cast<double>(step + 1) - begun;
+    const double to = until < steps - kSameInstant ? until * part : 1.0;
     if (to <= from) continue;
     if (largest < 0.0 || step == again) {
       const double missing_v = away_v(m, place.terminal, given.with(input.at(from)));

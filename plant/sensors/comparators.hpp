@@ -97,7 +97,7 @@ class Comparators {
   /// `given` is what the input before the RC is between.
   void switch_within(ComparatorMemory& m, const Place& place, const Input& input,
                      const Span& given) const noexcept;
-  /// From one part of the interval to another.
+  /// `from` and `to` are parts of the interval, 0 to 1.
   void switch_within(ComparatorMemory& m, const Place& place, const Input& input, double added_v, double from,
                      double to) const noexcept;
 

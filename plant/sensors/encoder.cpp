@@ -201,9 +201,9 @@ bool Encoder::keeps_count(const EncoderState& state, std::span<const AngleSegmen
 
 bool Encoder::passes_no_index(const EncoderState& state, std::span<const AngleSegment> segments,
                               std::int64_t turn) const noexcept {
-  const std::int64_t last = p_.counts_per_revolution - 1;
-  const std::int64_t before = state.count + state.ahead - turn * p_.counts_per_revolution;
-  return before >= 1 && before < last && stays_between(1.0, static_cast<double>(last), segments);
+  const std::int64_t end = p_.counts_per_revolution;
+  const std::int64_t before = state.count + state.ahead - turn * end;
+  return before >= 1 && before < end && stays_between(1.0, static_cast<double>(end), segments);
 }
 
 bool Encoder::stays_between(double from, double to, std::span<const AngleSegment> segments) const noexcept {

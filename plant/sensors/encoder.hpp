@@ -139,7 +139,7 @@ class Encoder {
   /// then follow() would change nothing.
   bool keeps_count(const EncoderState& state, std::span<const AngleSegment> segments,
                    std::int64_t turn) const noexcept;
-  /// Whether it surely stays within the turn.
+  /// Whether the index line surely does not rise: then only the count changes.
   bool passes_no_index(const EncoderState& state, std::span<const AngleSegment> segments,
                        std::int64_t turn) const noexcept;
   /// Whether the path surely stays between two counts. It looks at the ends of a segment alone: between them

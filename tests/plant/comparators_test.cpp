@@ -5,6 +5,7 @@
 #include <array>
 #include <cmath>
 #include <numbers>
+#include <random>
 #include <vector>
 
 #include "plant/axis.hpp"
@@ -68,6 +69,54 @@ TEST(Comparators, AStepAndARampThroughAnRcCrossWhereTheirFormulasSay) {
     const double t = r.edge_s[0];
     EXPECT_EQ(r.edges[0], 1u);
     EXPECT_NEAR(2e5 * (t - kRc_s + kRc_s * std::exp(-t / kRc_s)), 0.25, 1e-12);
+  }
+}
+
+// Time constants from a ten-thousandth of the interval to a million times its length, against bisection of
+// the closed form. Catches: a wrong root, one that is only near, a search that gives up where the transient
+// is long over or has hardly begun.
+TEST(Comparators, EveryTimeConstantCrossesWhereItsFormulaSays) {
+  constexpr double kThreshold_v = 0.25;
+  std::mt19937_64 random(5);
+  const auto between = [&random](double from, double to) {
+    return std::uniform_real_distribution(from, to)(random);
+  };
+  int crossed = 0;
+  for (int n = 0; n < 20'000; ++n) {
+    const double rc_s = kPeriod_s * std::pow(10.0, between(-4.0, 6.0));
+    const double u0 = between(-3.0, 3.0);
+    const double u1 = between(-3.0, 3.0) / kPeriod_s;
+    const double charge_v = between(-3.0, kThreshold_v);
+    const double transient_v = charge_v - (u0 - u1 * rc_s);
+    const auto y_v = [&](double t) {
+      // Of a slow transient what is left is a difference: expm1 keeps its digits.
+      return charge_v + u1 * t + transient_v * std::expm1(-t / rc_s);
+    };
+    const ComparatorMemory m =
+        followed(made(fixed_at(0.0, rc_s, 2.0 * kThreshold_v)), [&](double t) { return u0 + u1 * t; }, kWhole,
+                 {.filtered_v = {charge_v, 0.0, 0.0}});
+    const double rounding_v = 1e-14 * (std::abs(u0) + std::abs(u1 * rc_s) + std::abs(charge_v));
+    EXPECT_NEAR(m.filtered_v.a, y_v(kPeriod_s), 10.0 * rounding_v + 1e-6 * kPeriod_s / rc_s) << rc_s;
+    if (m.edges[0] != 1) continue;
+    ++crossed;
+    EXPECT_NEAR(y_v(m.edge_s[0]), kThreshold_v, 10.0 * rounding_v + 1e-12) << rc_s << " " << m.edge_s[0];
+  }
+  EXPECT_GT(crossed, 2000);
+}
+
+// Rounding of the terminals by their last digit, in intervals so short that nothing happens. Catches: a
+// memory that is lost in the difference of two large numbers.
+TEST(Comparators, TheShortestIntervalChangesNothing) {
+  for (const double duration_s : {1e-12, 1e-17, 1e-21}) {
+    const Comparators comparators = made(fixed_at(0.0, 20e-6));
+    for (const double middle_v : {11.3, std::nextafter(11.3, 0.0), std::nextafter(11.3, 20.0)}) {
+      ComparatorMemory m{.filtered_v = {5.0, 0.0, 0.0}, .levels = 1};
+      comparators.follow(
+          m, 0, 0.0, duration_s,
+          {.start_v = {11.3, 0.0, 0.0}, .middle_v = {middle_v, 0.0, 0.0}, .end_v = {11.3, 0.0, 0.0}});
+      EXPECT_NEAR(m.filtered_v.a, 5.0 + 6.3 * duration_s / 20e-6, 1e-14) << duration_s;
+      EXPECT_EQ(m.edges[0], 0u);
+    }
   }
 }
 

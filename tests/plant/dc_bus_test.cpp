@@ -37,6 +37,25 @@ TEST(DcBus, TheLinkIsThatOfTheAmplifierUnlessItIsGiven) {
   EXPECT_EQ(supply_voltage_v(p, 80.0, Connection::kStar), 300.0);
 }
 
+// Against the closed form of a constant current. Catches: a mean or an end that turns back where a step is
+// long for the link.
+TEST(DcBus, AForeseenLinkGoesTowardsItsRestAndNoFurther) {
+  BusParameters p = kBus;
+  p.battery = true;
+  constexpr double kBefore_v = 310.0;
+  constexpr double kTaken_a = 20.0;
+  const double rest_v = p.voltage_v - p.resistance_ohm * kTaken_a;
+  const double way_v = kBefore_v - rest_v;
+  for (const double x : {1e-6, 0.01, 0.3, 1.0, 1.9, 2.1, 5.0, 50.0}) {
+    const double duration_s = x * p.resistance_ohm * p.capacitance_f;
+    const ForeseenLink link = foreseen_link(p, p.voltage_v, kBefore_v, false, kTaken_a, duration_s);
+    const double end_bound = x < 2.0 ? std::pow(x, 5) / 720.0 : 0.0;
+    EXPECT_NEAR((link.end_v - rest_v) / way_v, std::exp(-x), end_bound + 1e-13) << x;
+    EXPECT_NEAR((link.mean_v - rest_v) / way_v, -std::expm1(-x) / x, std::pow(x, 4) / 720.0 + 1e-9) << x;
+    EXPECT_LE(std::abs(link.end_v - rest_v), std::abs(way_v)) << x;
+  }
+}
+
 // Random loads and intervals; the balance closes to rounding, whatever the load does. The supply never takes
 // energy back. Catches: energy of one part that is not that of the others, a diode the wrong way round, a
 // brake resistor that gives energy.

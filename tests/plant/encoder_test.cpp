@@ -5,6 +5,7 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <random>
 #include <vector>
 
 #include "tests/plant/encoder_motion.hpp"
@@ -165,6 +166,38 @@ TEST(Encoder, AfterAReversalTheIndexIsTheLastOneInTime) {
   EXPECT_LT(s.count, 2000);
   EXPECT_EQ(s.index_count, 2000);
   EXPECT_EQ(s.direction, -1);
+}
+
+// Random motions, half of them within a few counts of the index, with reversals. Catches: a count that skips
+// the edges and the index with them, or that forgets what faults have made of it.
+TEST(Encoder, WhoAsksForTheCountAloneGetsTheSameCountAndIndex) {
+  constexpr int kCounts = 2000;
+  constexpr double kQuantum_rad = kTurn_rad / kCounts;
+  const Encoder encoder({.counts_per_revolution = kCounts}, kTick_s);
+  std::mt19937_64 random(3);
+  const auto between = [&random](double from, double to) {
+    return std::uniform_real_distribution(from, to)(random);
+  };
+  int indices = 0;
+  for (int n = 0; n < 20'000; ++n) {
+    const double from_counts =
+        n % 2 == 0 ? between(0.0, kCounts) : between(-4.0, 4.0) + (n % 4 == 1 ? kCounts : 0);
+    const double speed_rad_s = between(-8.0, 8.0) * kQuantum_rad / kTick_s;
+    const Motion m{from_counts * kQuantum_rad, speed_rad_s, -speed_rad_s / kTick_s * between(0.0, 4.0)};
+    constexpr std::int64_t kTurn = 4;
+    EncoderState whole = start(encoder, m.angle_rad, kTurn);
+    whole.ahead = 7;
+    whole.count -= 7;
+    EncoderState count_alone = whole;
+    encoder.follow(whole, segments_of(m), n, kTurn, kNoFaults);
+    encoder.count(count_alone, segments_of(m), n, kTurn, kNoFaults);
+    ASSERT_EQ(count_alone.count, whole.count) << n;
+    ASSERT_EQ(count_alone.ahead, whole.ahead) << n;
+    ASSERT_EQ(count_alone.index_count, whole.index_count) << n;
+    ASSERT_EQ(count_alone.index_tick, whole.index_tick) << n;
+    indices += whole.index_tick == n ? 1 : 0;
+  }
+  EXPECT_GT(indices, 1000);
 }
 
 // Catches: a count, turn or edge in 32 bits.
