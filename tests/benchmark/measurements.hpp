@@ -4,7 +4,8 @@
 
 #include "tests/benchmark/harness/report.hpp"
 
-/// The measurements, one file and one namespace each, as long as plan() says. They throw when something does not work at all.
+/// The measurements, each file with a namespace of its name (or of its plural, where the product has one of
+/// that name), as long as plan() says. They throw when something does not work at all.
 namespace drivebench::speed {
 
 /// A whole tick against the bare integration of the same substeps.

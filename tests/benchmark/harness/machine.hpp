@@ -35,7 +35,7 @@ class Pinned {
   cpu_set_t before_{};
 };
 
-/// The calling thread runs where nobody else wants to.
+/// The calling thread gets the lowest priority.
 void give_way();
 
 /// Model and number of the CPUs, and the kernel: a figure needs them.

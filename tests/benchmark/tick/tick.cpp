@@ -144,7 +144,7 @@ Round one_round(Race& race) {
   return {.bench_ns = percentile(bench_ns, 0.5), .bare_ns = percentile(bare_ns, 0.5)};
 }
 
-Row measure(const std::string& name, bool running) {
+Row row_of(const std::string& name, bool running) {
   const std::array cpu{cpu_pair().far};
   const Pinned pinned(cpu[0]);
   Race race(running);
@@ -164,7 +164,7 @@ Row measure(const std::string& name, bool running) {
 }  // namespace
 
 std::vector<Row> measure() {
-  return {measure("tick, standing", false), measure("tick, turning", true)};
+  return {row_of("tick, standing", false), row_of("tick, turning", true)};
 }
 
 }  // namespace drivebench::speed::tick
