@@ -125,13 +125,6 @@ class GateAxis {
     LegLevels levels{};
     std::uint64_t joined = 0;  ///< bit 0 for a: legs that change within it without moving their voltage
   };
-  /// The tick and the step of the grid around an instant.
-  struct Place {
-    Tick tick = 0;
-    Picoseconds tick_start = 0;
-    Picoseconds grid = 0;  ///< the last point of the grid, not after it
-    Picoseconds next_grid = 0;
-  };
   /// What save() writes; behind it the events that have been told and not been handed out.
   struct Saved {
     Moment base{};
@@ -184,12 +177,8 @@ class GateAxis {
   Now seen() const;
   /// Lets a part end now.
   void stop_here();
-  Place place_of(Picoseconds at) const noexcept;
-  const Place& place() const noexcept {
-    if (clock_.at < place_.grid || clock_.at >= place_.next_grid) place_ = place_of(clock_.at);
-    return place_;
-  }
-  Tick tick() const noexcept { return place().tick; }
+  Tick tick() const noexcept { return clock_.at / period_; }
+  Picoseconds grid_after(Picoseconds at) const noexcept;
   double within_tick_s(Picoseconds at) const noexcept;
   Picoseconds at_of(double within_tick_s, Picoseconds from) const noexcept;
 
@@ -205,12 +194,11 @@ class GateAxis {
   Picoseconds period_;
   int substeps_;
 
-  Clock clock_{};          ///< where the axis is: at the end of a part, not before now_
-  mutable Place place_{};  ///< of the clock when place() was last called, whose divisions take long
-  Moment base_{};          ///< where that part, or the first one that next_edge() has looked at, began
-  Moment unjoined_{};      ///< before a part with joined legs that does not begin at base_
-  Moment here_{};          ///< at now_, if run_to_now() has been there since begin_here(); else at kNowhere
-  Moment aside_{};         ///< where it was before look() or catch_up() took it back
+  Clock clock_{};      ///< where the axis is: at the end of a part, not before now_
+  Moment base_{};      ///< where that part, or the first one that next_edge() has looked at, began
+  Moment unjoined_{};  ///< before a part with joined legs that does not begin at base_
+  Moment here_{};      ///< at now_, if run_to_now() has been there since begin_here(); else at kNowhere
+  Moment aside_{};     ///< where it was before look() or catch_up() took it back
   Picoseconds now_ = 0;
   std::vector<Logged> log_{};                   ///< what happens from base_ on
   std::size_t passed_ = 0;                      ///< of them, which have been handed out

@@ -32,27 +32,25 @@ Picoseconds next_move(LegTimer leg, std::int64_t flow, Picoseconds until) noexce
 }  // namespace
 
 double GateAxis::within_tick_s(Picoseconds at) const noexcept {
-  return 1e-12 * static_cast<double>(at - place().tick_start);
+  return 1e-12 * static_cast<double>(at - tick() * period_);
 }
 
 Picoseconds GateAxis::at_of(double within_tick_s, Picoseconds from) const noexcept {
-  return std::max(from, place().tick_start + static_cast<Picoseconds>(std::llround(1e12 * within_tick_s)));
+  return std::max(from, tick() * period_ + static_cast<Picoseconds>(std::llround(1e12 * within_tick_s)));
 }
 
-GateAxis::Place GateAxis::place_of(Picoseconds at) const noexcept {
-  Place place{.tick = at / period_};
-  place.tick_start = place.tick * period_;
-  const auto grid = [&](Picoseconds n) { return place.tick_start + n * period_ / substeps_; };
-  Picoseconds n = (at - place.tick_start) * substeps_ / period_;
-  while (grid(n + 1) <= at)
-    ++n;
-  place.grid = grid(n);
-  place.next_grid = grid(n + 1);
-  return place;
+Picoseconds GateAxis::grid_after(Picoseconds at) const noexcept {
+  const Picoseconds start = at / period_ * period_;
+  const Picoseconds step = (at - start) * substeps_ / period_;
+  for (Picoseconds n = step;; ++n) {
+    const Picoseconds grid = start + n * period_ / substeps_;
+    if (grid > at) return grid;
+  }
 }
 
 GateAxis::Part GateAxis::part_up_to(Picoseconds limit, bool may_join) const noexcept {
-  Part part{.to = std::min(limit, place().next_grid)};
+  const Picoseconds from = clock_.at;
+  Part part{.to = std::min(limit, grid_after(from))};
   std::array<Picoseconds, 3> change{};
   for (std::size_t k = 0; k < change.size(); ++k) {
     const LegTimer& leg = clock_.legs[k];
@@ -102,7 +100,7 @@ bool GateAxis::try_to_extend(Picoseconds limit, bool may_join) {
     if (!run_part(part)) return false;
     if ((axis_.state().faults & kDiverged) != 0) clock_.diverged_from = from;
   }
-  const bool ends_tick = part.to == place().tick_start + period_;
+  const bool ends_tick = part.to == (tick() + 1) * period_;
   if (ends_tick) {
     if (clock_.diverged_from == LegTimer::kNever) axis_.close_tick();
     clock_.tick_open = 0;

@@ -23,16 +23,15 @@ bool is_possible(const LegSetting& s) noexcept {
 }
 
 Picoseconds LegTimer::phase(Picoseconds now) const noexcept {
-  if (setting_.mode < LegMode::kPwm) return 0;
   const Picoseconds rest = (now - setting_.period_start) % setting_.period;
   return rest < 0 ? rest + setting_.period : rest;
 }
 
-LegLevel LegTimer::wanted(Picoseconds since_start) const noexcept {
+LegLevel LegTimer::wanted(Picoseconds now) const noexcept {
   if (setting_.mode == LegMode::kOpen) return LegLevel::kOff;
   if (setting_.mode == LegMode::kLow) return LegLevel::kLow;
   if (setting_.mode == LegMode::kHigh) return LegLevel::kHigh;
-  const Picoseconds since_on = since_start - on_from();
+  const Picoseconds since_on = phase(now) - on_from();
   const bool on = since_on >= 0 && since_on < setting_.compare;
   if (setting_.mode == LegMode::kPwmLow) return on ? LegLevel::kLow : LegLevel::kOff;
   if (on) return LegLevel::kHigh;
@@ -40,8 +39,7 @@ LegLevel LegTimer::wanted(Picoseconds since_start) const noexcept {
 }
 
 void LegTimer::change_to(Picoseconds now) noexcept {
-  const Picoseconds since_start = phase(now);
-  const LegLevel to = wanted(since_start);
+  const LegLevel to = wanted(now);
   if (to != wanted_) {
     if (level_ != LegLevel::kOff) opened_[switch_of(level_)] = now;
     wanted_ = to;
@@ -49,7 +47,7 @@ void LegTimer::change_to(Picoseconds now) noexcept {
     closes_ = to == LegLevel::kOff ? now : std::max(now, opened_[1 - switch_of(to)] + setting_.dead);
   }
   if (closes_ <= now) level_ = wanted_;
-  next_ = next_after(now, since_start);
+  next_ = next_after(now);
 }
 
 bool LegTimer::is_possible(Picoseconds now) const noexcept {
@@ -58,23 +56,22 @@ bool LegTimer::is_possible(Picoseconds now) const noexcept {
   };
   const auto has_been = [now](Picoseconds at) noexcept { return at >= kLongAgo && at <= now; };
   const auto stays = [&] {
-    const Picoseconds since_start = phase(now);
-    return wanted_ == wanted(since_start) && level_ == (closes_ <= now ? wanted_ : LegLevel::kOff) &&
-           next_ == next_after(now, since_start);
+    return wanted_ == wanted(now) && level_ == (closes_ <= now ? wanted_ : LegLevel::kOff) &&
+           next_ == next_after(now);
   };
   return drivebench::is_possible(setting_) && is_level(wanted_) && is_level(level_) && has_been(opened_[0]) &&
          has_been(opened_[1]) && closes_ >= kLongAgo && closes_ <= now + LegSetting::kLongestDead &&
          (next_ == now || stays());
 }
 
-Picoseconds LegTimer::next_after(Picoseconds now, Picoseconds since_start) const noexcept {
+Picoseconds LegTimer::next_after(Picoseconds now) const noexcept {
   Picoseconds next = closes_ > now ? closes_ : kNever;
   if (!switches()) return next;
+  const Picoseconds at = phase(now);
   const Picoseconds from = on_from();
   const Picoseconds until = from + setting_.compare;
-  const Picoseconds change =
-      since_start < from ? from : (since_start < until ? until : setting_.period + from);
-  return std::min(next, now + (change - since_start));
+  const Picoseconds change = at < from ? from : (at < until ? until : setting_.period + from);
+  return std::min(next, now + (change - at));
 }
 
 }  // namespace drivebench

@@ -70,9 +70,8 @@ class LegTimer {
   static constexpr Picoseconds kLongAgo = -(Picoseconds{1} << 62);
 
   void change_to(Picoseconds now) noexcept;
-  /// `since_start` is phase(now).
-  LegLevel wanted(Picoseconds since_start) const noexcept;
-  Picoseconds next_after(Picoseconds now, Picoseconds since_start) const noexcept;
+  LegLevel wanted(Picoseconds now) const noexcept;
+  Picoseconds next_after(Picoseconds now) const noexcept;
   bool switches() const noexcept {
     return setting_.mode >= LegMode::kPwm && setting_.compare > 0 && setting_.compare < setting_.period;
   }
@@ -80,7 +79,7 @@ class LegTimer {
   Picoseconds on_from() const noexcept {
     return setting_.centred != 0 ? (setting_.period - setting_.compare) / 2 : 0;
   }
-  /// Since the start of the period that is running; 0 without PWM.
+  /// Since the start of the period that is running.
   Picoseconds phase(Picoseconds now) const noexcept;
 
   LegSetting setting_{};

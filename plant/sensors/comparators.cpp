@@ -175,8 +175,9 @@ class Comparators::Input {
       if (std::abs(v) <= close_enough_v) return at;
       const double falling_v = rate_ * rest_v - slope_ - 2.0 * curve_ * at;
       if (!(std::abs(rate_ * v) <= kShort * std::abs(falling_v)) || falling_v == 0.0) return std::nullopt;
-      at += v / falling_v;
-      decay *= step_decay(rate_ * v / falling_v);
+      const double step = v / falling_v;
+      at += step;
+      decay *= step_decay(rate_ * step);
     }
     return std::nullopt;
   }
@@ -267,8 +268,7 @@ bool Comparators::is_out_of_reach(double away_v) const noexcept {
 }
 
 /// The noise changes at fixed instants of the tick, whatever the intervals are. Where it cannot bring the
-/// input to its threshold, only how large it is at most is asked; once none can, the rest is skipped: a long
-/// interval is asked again after its first whole step, when the transient has decayed by that much. A step
+/// input to its threshold, only how large it is at most is asked; once none can, the rest is skipped. A step
 /// that would begin with the end of the interval, but for rounding, belongs to the next one.
 void Comparators::switch_within(ComparatorMemory& m, const Place& place, const Input& input,
                                 const Span& given) const noexcept {
@@ -276,18 +276,16 @@ void Comparators::switch_within(ComparatorMemory& m, const Place& place, const I
   if (p_.noise_rms_v == 0.0) return switch_within(m, place, input, added_v, 0.0, 1.0);
   const NoiseChannel noise = noise_[index_of(place.terminal)];
   constexpr double kSameInstant = 1e-9;  // in steps
-  constexpr double kManySteps = 4.0;
   const double steps = place.duration_s / noise_step_s_;
   const double part = 1.0 / steps;
   const double begun = place.start_s / noise_step_s_;
   std::int64_t step = floor_to_integer(begun + kSameInstant);
-  const std::int64_t again = steps > kManySteps ? step + 2 : -1;
   double largest = -1.0;  // draw of noise that reaches the threshold from where the input has come to
   for (double from = 0.0; from < 1.0; ++step) {
     const double until = static_cast<double>(step + 1) - begun;
     const double to = until < steps - kSameInstant ? until * part : 1.0;
     if (to <= from) continue;
-    if (largest < 0.0 || step == again) {
+    if (largest < 0.0) {
       const double missing_v = away_v(m, place.terminal, given.with(input.at(from)));
       if (is_out_of_reach(missing_v)) return;
       const double sigmas = missing_v / p_.noise_rms_v;

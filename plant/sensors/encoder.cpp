@@ -195,27 +195,16 @@ bool Encoder::is_sound(const InjectedFaults& faults) const noexcept {
 
 bool Encoder::keeps_count(const EncoderState& state, std::span<const AngleSegment> segments,
                           std::int64_t turn) const noexcept {
-  const auto count = static_cast<double>(state.count + state.ahead - turn * p_.counts_per_revolution);
-  return stays_between(count, count + 1.0, segments);
-}
-
-bool Encoder::passes_no_index(const EncoderState& state, std::span<const AngleSegment> segments,
-                              std::int64_t turn) const noexcept {
-  const std::int64_t end = p_.counts_per_revolution;
-  const std::int64_t before = state.count + state.ahead - turn * end;
-  return before >= 1 && before < end && stays_between(1.0, static_cast<double>(end), segments);
-}
-
-bool Encoder::stays_between(double from, double to, std::span<const AngleSegment> segments) const noexcept {
   constexpr double kAstray = 0.15;  // above 4/27
   constexpr double kRounding = 1e-14;
-  const auto is_within = [=](double place, double astray) noexcept {
-    return place - astray >= from && place + astray < to;
+  const auto count = static_cast<double>(state.count + state.ahead - turn * p_.counts_per_revolution);
+  const auto is_within = [count](double place, double astray) noexcept {
+    return place - astray >= count && place + astray < count + 1.0;
   };
   if (!is_within(position(segments.back().end_rad), 0.0)) return false;
   return std::ranges::all_of(segments, [&](const AngleSegment& s) noexcept {
     const double slopes_rad = s.duration_s * (std::abs(s.start_rad_s) + std::abs(s.end_rad_s));
-    const double rounding = slopes_rad > 0.0 ? kRounding * (1.0 + std::abs(to)) : 0.0;
+    const double rounding = slopes_rad > 0.0 ? kRounding * (1.0 + std::abs(count)) : 0.0;
     const double astray = kAstray * counts_per_rad_ * slopes_rad + rounding;
     return is_within(position(s.start_rad), astray) && is_within(position(s.end_rad), astray);
   });
@@ -237,12 +226,7 @@ void Encoder::count(EncoderState& state, std::span<const AngleSegment> segments,
   if (segments.empty()) return;
   if (is_sound(faults)) {
     if (keeps_count(state, segments, turn)) return;
-    if (passes_no_index(state, segments, turn)) {
-      const std::int64_t end = floor_to_integer(position(segments.back().end_rad));
-      state.count = turn * p_.counts_per_revolution + end - state.ahead;
-    } else {
-      follow_with(CountView{}, state, segments, tick, turn);
-    }
+    follow_with(CountView{}, state, segments, tick, turn);
   } else {
     follow_with(view_of(faults), state, segments, tick, turn);
   }

@@ -136,16 +136,11 @@ class Encoder {
 
   bool is_sound(const InjectedFaults& faults) const noexcept;
   /// Whether the count of a sound encoder surely stays the same on these segments, as while the shaft stands:
-  /// then follow() would change nothing.
+  /// then follow() would change nothing. It looks at the ends of a segment alone: between them the cubic
+  /// leaves their range by at most 4/27 of the sum of its end slopes. It is false close to an edge, because
+  /// rounding may put one where a cubic turns.
   bool keeps_count(const EncoderState& state, std::span<const AngleSegment> segments,
                    std::int64_t turn) const noexcept;
-  /// Whether the index line surely does not rise: then only the count changes.
-  bool passes_no_index(const EncoderState& state, std::span<const AngleSegment> segments,
-                       std::int64_t turn) const noexcept;
-  /// Whether the path surely stays between two counts. It looks at the ends of a segment alone: between them
-  /// the cubic leaves their range by at most 4/27 of the sum of its end slopes. It is false close to an edge,
-  /// because rounding may put one where a cubic turns.
-  bool stays_between(double from, double to, std::span<const AngleSegment> segments) const noexcept;
   View view_of(const InjectedFaults& faults) const noexcept;
   template <class AnyView>
   void follow_with(const AnyView& view, EncoderState& state, std::span<const AngleSegment> segments,

@@ -60,12 +60,9 @@ ForeseenLink foreseen_link(const BusParameters& p, double supply_v, double bus_v
   const double leak_s = supply_s + (chopper ? 1.0 / p.chopper_ohm : 0.0);
   const double rest_v = (supply_s * supply_v - taken_a) / leak_s;
   const double x = leak_s * duration_s / p.capacitance_f;
-  constexpr double kShort = 2.0;
-  // x/(1 - e^-x) = 1 + x/2 + x^2/12 - ...; where this mean leads is the [2/2] Pade approximant of e^-x.
-  const double mean_part = 1.0 / (1.0 + x * (0.5 + x / 12.0));
-  const double end_part = x < kShort ? 1.0 - x * mean_part : exponential(-x);
-  const double mean_v = rest_v + (bus_v - rest_v) * mean_part;
-  const double end_v = rest_v + (bus_v - rest_v) * end_part;
+  // x/(1 - e^-x) = 1 + x/2 + x^2/12 - ...
+  const double mean_v = rest_v + (bus_v - rest_v) / (1.0 + x * (0.5 + x / 12.0));
+  const double end_v = rest_v + (bus_v - rest_v) * exponential(-x);
   return {.mean_v = std::max(mean_v, 0.5 * bus_v), .end_v = std::max(end_v, 0.0)};
 }
 

@@ -47,8 +47,8 @@ struct ForeseenLink {
 };
 
 /// `taken_a` from the positive rail, of a battery with R > 0. The mean errs by x^4/720 of the way that the
-/// link has to go, x the duration over its time constant, and the end by x^5/720 up to x = 2. The mean is at
-/// least half of the voltage before, as in bus_after().
+/// link has to go, x the duration over its time constant, and is at least half of the voltage before, as in
+/// bus_after().
 ForeseenLink foreseen_link(const BusParameters& p, double supply_v, double bus_v, bool chopper,
                            double taken_a, double duration_s) noexcept;
 
